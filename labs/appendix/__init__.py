@@ -1,0 +1,4 @@
+"""Chapter A of the course."""
+
+NUMBER = "A"
+TITLE = "Appendices"

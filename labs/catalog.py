@@ -1,0 +1,86 @@
+"""Finds the labs: every module of a chapter package that defines a `Lab` is one.
+
+A chapter is a package with `NUMBER` and `TITLE`. A lab named `joint_control.py` has the slug
+"joint-control" and its article `joint_control.md` beside it. `ORCLAB_LABS` may name further
+chapter packages, separated by commas (one's own course, the test suite's labs).
+"""
+
+import importlib
+import os
+import pkgutil
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from labs.errors import UnknownLab
+from labs.lab import Lab
+
+CHAPTERS = (
+    "labs.reactive_control",
+    "labs.optimal_control",
+    "labs.reinforcement_learning",
+    "labs.appendix",
+)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One lab found: where it stands in the course, and the lab itself."""
+
+    slug: str
+    chapter: str
+    chapter_title: str
+    lab: Lab[Any, Any]
+    package: str
+
+    @property
+    def article(self) -> str:
+        """The article's Markdown."""
+        return self._resource(".md").read_text(encoding="utf-8")
+
+    @property
+    def picture(self) -> bytes | None:
+        """The card's picture (`NAME.webp`), rendered from the real scene; None if not made."""
+        resource = self._resource(".webp")
+        return resource.read_bytes() if resource.is_file() else None
+
+    def _resource(self, suffix: str) -> Any:
+        return files(self.package).joinpath(self.slug.replace("-", "_") + suffix)
+
+
+@cache
+def catalog() -> dict[str, Entry]:
+    """All labs by slug, in the order of the course."""
+    extra = [name for name in os.environ.get("ORCLAB_LABS", "").split(",") if name]
+    entries = [entry for package in (*CHAPTERS, *extra) for entry in _labs_in(package)]
+    found: dict[str, Entry] = {}
+    for entry in entries:
+        if entry.slug in found:
+            raise ValueError(f"two labs are named {entry.slug}: {found[entry.slug]}, {entry}")
+        found[entry.slug] = entry
+    return found
+
+
+def find(slug: str) -> Entry:
+    """The lab of this name. Raises UnknownLab, which lists those there are."""
+    try:
+        return catalog()[slug]
+    except KeyError:
+        raise UnknownLab(f"no lab is named {slug!r}; there are {', '.join(catalog())}") from None
+
+
+def _labs_in(package: str) -> list[Entry]:
+    chapter = importlib.import_module(package)
+    entries = []
+    for info in pkgutil.iter_modules(chapter.__path__):
+        module = importlib.import_module(f"{package}.{info.name}")
+        for value in vars(module).values():
+            if (
+                isinstance(value, type)
+                and issubclass(value, Lab)
+                and value.__module__ == module.__name__
+            ):
+                slug = info.name.replace("_", "-")
+                entries.append(Entry(slug, chapter.NUMBER, chapter.TITLE, value(), package))
+    return sorted(entries, key=lambda entry: (entry.lab.section, entry.slug))

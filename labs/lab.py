@@ -1,0 +1,120 @@
+"""The contract every lab fulfils.
+
+A lab is one idea of the course as a small world: parameters the user turns, a state that
+evolves, numbers to plot and things to draw. The same object runs live behind a page and
+headless under `labs.run`, bit for bit the same.
+"""
+
+import abc
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Generic, TypeVar
+
+import numpy as np
+
+from labs.params import Params, Value
+from labs.plots import Plot
+from labs.scene import Scene
+
+Measurement = Mapping[str, "float | np.ndarray"]
+
+
+@dataclass(frozen=True)
+class Action:
+    """A button that does something once, in the panel and on the page ("push")."""
+
+    name: str
+    label: str
+    help: str
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What the user does to the world besides turning parameters, as one step sees it."""
+
+    actions: tuple[str, ...] = ()
+    """Names of the actions pressed since the last step."""
+    handles: Mapping[str, tuple[float, float, float]] = field(default_factory=dict)
+    """Where each held handle is dragged to [m]; a released handle is absent."""
+
+
+@dataclass
+class State:
+    """What evolves: arrays and numbers only, so that it can be saved, rewound and branched.
+
+    `trouble` is empty while all is well. A step that cannot go on sets it to a sentence that
+    says when and why it stopped and what to change; the world then waits for a reset."""
+
+    t: float = 0.0
+    """Simulated time [s]."""
+    trouble: str = ""
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """One iteration of a solver: what `Lab.accept` takes into the state."""
+
+    iteration: int
+    data: Mapping[str, Any] = field(default_factory=dict)
+    done: str = ""
+    """Why the solver stopped, in a sentence; empty while it goes on."""
+
+
+P = TypeVar("P", bound=Params)
+S = TypeVar("S", bound=State)
+
+
+class Lab(abc.ABC, Generic[P, S]):
+    """One lab. It has a world's clock (`step`), a solver's clock (`solve`), both or neither.
+
+    Instances keep no state between calls; caches of models and workspaces are allowed."""
+
+    title: ClassVar[str]
+    section: ClassVar[str]
+    """Section of the notes, "1.2"."""
+    summary: ClassVar[str]
+    """One sentence for the card on the home page."""
+    Params: ClassVar[type[Params]]
+    plots: ClassVar[tuple[Plot, ...]] = ()
+    period: ClassVar[float] = 0.01
+    """[s] simulated by one step of the world's clock; every step is recorded."""
+    presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {}
+    """Named settings; a preset starts from the defaults."""
+    actions: ClassVar[tuple[Action, ...]] = ()
+
+    @abc.abstractmethod
+    def init(self, params: P, rng: np.random.Generator) -> S:
+        """The state at t = 0. All randomness of a run descends from `rng`."""
+
+    def step(self, params: P, inputs: Inputs, state: S) -> S:
+        """The state one `period` later."""
+        raise NotImplementedError
+
+    def solve(self, params: P, state: S) -> Iterator[Snapshot]:
+        """Yields after every iteration of the solver, the last with `done` set."""
+        raise NotImplementedError
+
+    def accept(self, params: P, state: S, snapshot: Snapshot) -> S:
+        """The state that has taken in what the solver found."""
+        raise NotImplementedError
+
+    def measure(self, params: P, state: S) -> Measurement:
+        """Channels over time: scalars and (n,) vectors, finite, the same shapes all through a
+        run. A scalar that is not defined (yet) is left out."""
+        return {}
+
+    def fields(self, params: P, state: S) -> Mapping[str, np.ndarray]:
+        """Arrays for curves, heat maps, matrices and bars; asked for a few times a second."""
+        return {}
+
+    @abc.abstractmethod
+    def draw(self, scene: Scene, params: P, state: S) -> None:
+        """Draws one frame."""
+
+    @classmethod
+    def has_world(cls) -> bool:
+        return cls.step is not Lab.step
+
+    @classmethod
+    def has_solver(cls) -> bool:
+        return cls.solve is not Lab.solve

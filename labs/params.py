@@ -1,0 +1,232 @@
+"""Tunables: declared once, they become a slider, a validated field, a CLI option and a link.
+
+A lab's parameters are a frozen pydantic model whose fields are made by `knob` (a number on a
+slider), `choice` (one of a few named values) or `toggle` (on or off).
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic.fields import FieldInfo
+from pydantic_core.core_schema import ValidationInfo
+
+from labs.errors import ParameterError
+
+Effect = Literal["live", "solve", "restart"]
+Scale = Literal["linear", "log"]
+Value = float | str | bool
+
+# A logarithmic slider that reaches zero bends to linear below high / LOG_SPAN.
+LOG_SPAN = 1000.0
+
+
+@dataclass(frozen=True)
+class Tunable:
+    """What every tunable has. `effect`: "live" acts from the next step on, "solve" starts the
+    solver again, "restart" runs `Lab.init` again."""
+
+    help: str
+    label: str
+    symbol: str
+    group: str
+    effect: Effect
+
+    @property
+    def kind(self) -> str:
+        return type(self).__name__.lower()
+
+    def describe(self, name: str, default: Value) -> dict[str, Any]:
+        """Everything a page needs to show this tunable, as plain JSON data."""
+        return {"name": name, "kind": self.kind, "default": default, **vars(self)}
+
+
+@dataclass(frozen=True)
+class Knob(Tunable):
+    """A number in [low, high] on a slider. `symbol` is TeX as in the notes."""
+
+    unit: str
+    low: float
+    high: float
+    step: float
+    scale: Scale
+
+    def position(self, value: float) -> float:
+        """Where on the slider, in [0, 1], this value sits.
+
+        Logarithmic with low > 0: value = low (high/low)^s. With low = 0 the scale is
+        value = high (r^s - 1) / (r - 1) with r = LOG_SPAN, which passes through zero."""
+        if self.scale == "linear":
+            return (value - self.low) / (self.high - self.low)
+        if self.low > 0:
+            return math.log(value / self.low) / math.log(self.high / self.low)
+        return math.log1p(value / self.high * (LOG_SPAN - 1)) / math.log(LOG_SPAN)
+
+    def at(self, position: float) -> float:
+        """The value at a slider position in [0, 1], rounded to three significant digits."""
+        if position <= 0.0:
+            return self.low
+        if position >= 1.0:
+            return self.high
+        if self.scale == "linear":
+            return self.low + position * (self.high - self.low)
+        if self.low > 0:
+            value = self.low * (self.high / self.low) ** position
+        else:
+            value = self.high * math.expm1(position * math.log(LOG_SPAN)) / (LOG_SPAN - 1)
+        return min(max(float(f"{value:.3g}"), self.low), self.high)
+
+
+@dataclass(frozen=True)
+class Choice(Tunable):
+    """One of a few values. `options` maps each value to the words shown for it."""
+
+    options: Mapping[Any, str]
+    unit: str
+
+    def describe(self, name: str, default: Value) -> dict[str, Any]:
+        options = [{"value": value, "label": text} for value, text in self.options.items()]
+        return super().describe(name, default) | {"options": options}
+
+
+@dataclass(frozen=True)
+class Toggle(Tunable):
+    """On or off."""
+
+
+def knob(
+    default: float,
+    low: float,
+    high: float,
+    *,
+    symbol: str,
+    unit: str,
+    help: str,
+    label: str = "",
+    group: str = "",
+    step: float = 0.0,
+    scale: Scale = "linear",
+    effect: Effect = "live",
+) -> Any:
+    """A number in [low, high] with a slider. `step` is the slider's grain (0: a thousandth)."""
+    tunable = Knob(help, label or symbol, symbol, group, effect, unit, low, high, step, scale)
+    return _field(default, tunable, ge=low, le=high, allow_inf_nan=False)
+
+
+def choice(
+    default: Value,
+    options: Mapping[Any, str],
+    *,
+    help: str,
+    label: str,
+    symbol: str = "",
+    unit: str = "",
+    group: str = "",
+    effect: Effect = "live",
+) -> Any:
+    """One of a few values; `options` maps each value to the words shown for it."""
+    tunable = Choice(help, label, symbol, group, effect, options, unit)
+    return _field(default, tunable, json_schema_extra={"enum": list(options)})
+
+
+def toggle(
+    default: bool, *, help: str, label: str, group: str = "", effect: Effect = "live"
+) -> Any:
+    """On or off."""
+    return _field(default, Toggle(help, label, "", group, effect))
+
+
+def _field(default: Value, tunable: Tunable, **constraints: Any) -> Any:
+    field: FieldInfo = Field(default, description=tunable.help, **constraints)
+    field.metadata.append(tunable)
+    return field
+
+
+class Params(BaseModel):
+    """The tunables of one lab: frozen, validated, every field with a default."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, validate_default=True)
+
+    tunables: ClassVar[Mapping[str, Tunable]] = {}
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        super().__pydantic_init_subclass__(**kwargs)
+        cls.tunables = {
+            name: entry
+            for name, field in cls.model_fields.items()
+            for entry in field.metadata
+            if isinstance(entry, Tunable)
+        }
+        bare = sorted(set(cls.model_fields) - set(cls.tunables))
+        if bare:
+            raise TypeError(f"{cls.__name__}: make {', '.join(bare)} with knob, choice or toggle")
+
+    @field_validator("*")
+    @classmethod
+    def _is_an_option(cls, value: Value, info: ValidationInfo) -> Value:
+        tunable = cls.tunables.get(info.field_name or "")
+        if isinstance(tunable, Choice) and value not in tunable.options:
+            raise ValueError("is none of its options")
+        return value
+
+    def change(self, changes: Mapping[str, object]) -> Self:
+        """These parameters with some changed. Raises ParameterError; changes all or nothing."""
+        unknown = sorted(set(changes) - set(self.tunables))
+        if unknown:
+            raise ParameterError(
+                f"no parameter is named {', '.join(map(repr, unknown))}; "
+                f"there are {', '.join(self.tunables)}"
+            )
+        try:
+            return type(self).model_validate(self.model_dump() | dict(changes))
+        except ValidationError as error:
+            raise ParameterError(
+                "; ".join(self._sentence(str(e["loc"][0]), e["input"]) for e in error.errors())
+            ) from None
+
+    def differing(self, other: Self) -> dict[str, Value]:
+        """The values of these parameters that `other` does not share."""
+        theirs = other.model_dump()
+        return {k: v for k, v in self.model_dump().items() if v != theirs[k]}
+
+    @classmethod
+    def read(cls, texts: Mapping[str, str]) -> dict[str, object]:
+        """Values from command lines and links: "500" to 500.0, "true" to True, words as words."""
+        return {name: _from_text(text, cls.tunables.get(name)) for name, text in texts.items()}
+
+    @classmethod
+    def describe(cls) -> list[dict[str, Any]]:
+        """All tunables in order, as plain JSON data."""
+        defaults = cls().model_dump()
+        return [tunable.describe(name, defaults[name]) for name, tunable in cls.tunables.items()]
+
+    @classmethod
+    def _sentence(cls, name: str, given: object) -> str:
+        tunable = cls.tunables[name]
+        shown = f"{name} = {str(given)[:80]!s}"
+        if isinstance(tunable, Knob):
+            unit = f" {tunable.unit}" if tunable.unit else ""
+            return f"{shown}: {name} takes a number from {tunable.low:g} to {tunable.high:g}{unit}"
+        if isinstance(tunable, Choice):
+            return f"{shown}: {name} takes one of {', '.join(map(str, tunable.options))}"
+        return f"{shown}: {name} takes true or false"
+
+
+def _from_text(text: str, tunable: Tunable | None) -> object:
+    if isinstance(tunable, Choice):
+        return next((value for value in tunable.options if str(value) == text), _number(text))
+    if isinstance(tunable, Toggle):
+        return {"true": True, "1": True, "on": True, "false": False, "0": False, "off": False}.get(
+            text.lower(), text
+        )
+    return _number(text)
+
+
+def _number(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text

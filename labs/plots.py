@@ -1,0 +1,110 @@
+"""What a lab may plot. A plot names channels: keys of what the lab's `measure` (recorded over
+time) or `fields` (asked for a few times a second) returns. Symbols are TeX, units SI."""
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+
+@dataclass(frozen=True)
+class Line:
+    """One curve. A vector channel makes one curve a component, chosen by the page's selector."""
+
+    channel: str
+    symbol: str
+    style: Literal["solid", "dash", "limit"] = "solid"
+
+
+@dataclass(frozen=True)
+class TimeSeries:
+    """Measured channels over time. `select` names what a vector's components are ("joint")."""
+
+    title: str
+    unit: str
+    lines: tuple[Line, ...]
+    select: str = ""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """y over x, both 1-D fields: a trajectory in a plane, eigenvalues as points."""
+
+    title: str
+    x: str
+    y: str
+    x_label: str
+    y_label: str
+    points: bool = False
+    guide: Literal["none", "imaginary-axis", "unit-circle"] = "none"
+
+
+@dataclass(frozen=True)
+class HeatMap:
+    """A 2-D field z over 1-D fields x (columns) and y (rows)."""
+
+    title: str
+    x: str
+    y: str
+    z: str
+    x_label: str
+    y_label: str
+    z_label: str
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """A small 2-D field written out in digits."""
+
+    title: str
+    field: str
+    symbol: str
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Bars:
+    """A 1-D field as bars, with the limit (a 1-D field) each must stay within."""
+
+    title: str
+    field: str
+    symbol: str
+    unit: str
+    limit: str = ""
+
+
+@dataclass(frozen=True)
+class Readout:
+    """A scalar channel as a number. Where it is not defined (yet), `measure` leaves it out."""
+
+    channel: str
+    label: str
+    unit: str
+
+
+Plot = TimeSeries | Curve | HeatMap | Matrix | Bars | Readout
+
+
+def measured(plot: Plot) -> tuple[str, ...]:
+    """The channels of `Lab.measure` a plot shows."""
+    if isinstance(plot, TimeSeries):
+        return tuple(line.channel for line in plot.lines)
+    return (plot.channel,) if isinstance(plot, Readout) else ()
+
+
+def pictured(plot: Plot) -> tuple[str, ...]:
+    """The channels of `Lab.fields` a plot shows."""
+    match plot:
+        case Curve(x=x, y=y):
+            return (x, y)
+        case HeatMap(x=x, y=y, z=z):
+            return (x, y, z)
+        case Matrix(field=field):
+            return (field,)
+        case Bars(field=field, limit=limit):
+            return (field, limit) if limit else (field,)
+        case _:
+            return ()
+
+
+def describe(plot: Plot) -> dict[str, Any]:
+    """A plot as plain JSON data; `kind` tells which."""
+    return {"kind": type(plot).__name__} | asdict(plot)

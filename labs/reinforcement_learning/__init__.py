@@ -1,0 +1,4 @@
+"""Chapter 3 of the course."""
+
+NUMBER = "3"
+TITLE = "Reinforcement learning"

@@ -1,0 +1,174 @@
+"""Every message on the wire, typed: the HTTP API, the page's stream, and the worker's pipe.
+
+The API validates what comes in; numbers are finite, sizes bounded. Page and worker messages are
+JSON objects with a `type`."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Value = float | bool | str
+Changes = Annotated[dict[Annotated[str, Field(max_length=64)], Value], Field(max_length=100)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Message(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+# The HTTP API ------------------------------------------------------------------------------
+
+
+class View(Message):
+    """How a page wants its scene. It never changes what is simulated."""
+
+    dark: bool = False
+    graphics: Literal["high", "low"] = "high"
+
+
+class NewSession(Message):
+    lab: Annotated[str, Field(max_length=64)]
+    params: Changes = {}
+    seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
+    view: View = View()
+
+
+class Run(Message):
+    """Let simulated time run."""
+
+    command: Literal["run"]
+
+
+class Pause(Message):
+    """Hold simulated time."""
+
+    command: Literal["pause"]
+
+
+class Step(Message):
+    """Pause, and advance by some of the lab's periods."""
+
+    command: Literal["step"]
+    count: Annotated[int, Field(ge=1, le=1000)] = 1
+
+
+class Reset(Message):
+    """Back to t = 0 with the present parameters."""
+
+    command: Literal["reset"]
+
+
+class Speed(Message):
+    """Simulated seconds per second of the wall clock."""
+
+    command: Literal["speed"]
+    factor: Annotated[Finite, Field(ge=0.1, le=4.0)]
+
+
+class Seed(Message):
+    """A new seed; restarts."""
+
+    command: Literal["seed"]
+    seed: Annotated[int, Field(ge=0, le=2**32 - 1)]
+
+
+class Apply(Message):
+    """All parameters to their defaults but for `params` (a preset, an experiment, or none:
+    the defaults); `restart` begins anew at t = 0, and runs."""
+
+    command: Literal["apply"]
+    params: Changes = {}
+    restart: bool = True
+
+
+class Press(Message):
+    """Press one of the lab's actions."""
+
+    command: Literal["press"]
+    action: Annotated[str, Field(max_length=64)]
+
+
+class SetView(Message):
+    """Light or dark, high or low graphics."""
+
+    command: Literal["view"]
+    view: View
+
+
+Command = Annotated[
+    Run | Pause | Step | Reset | Speed | Seed | Apply | Press | SetView,
+    Field(discriminator="command"),
+]
+
+
+class SessionInfo(Message):
+    id: str
+    lab: str
+    params: dict[str, Value]
+    seed: int
+    state: Literal["starting", "live", "recovering", "failed"]
+    scene: str
+    """Path of the 3D scene, for an iframe."""
+    stream: str
+    """Path of the WebSocket that tells what happens."""
+
+
+class Problem(Message):
+    """What every refused request answers."""
+
+    error: str
+    """What was wrong, what is allowed, what to do: for people."""
+    code: str
+    """The kind of problem: for programs."""
+
+
+# The page's stream (server to page) ----------------------------------------------------------
+
+
+class Hello(Message):
+    """First on every stream, and again after a worker was replaced."""
+
+    type: Literal["hello"] = "hello"
+    columns: list[str]
+    """Names of a telemetry row's entries: "t", then channels; a vector's are "q[0]", "q[1]"."""
+    period: float
+
+
+class Telemetry(Message):
+    """New samples, 30 times a second at most. A missing scalar is null."""
+
+    type: Literal["telemetry"] = "telemetry"
+    run: int
+    """Counts restarts: rows of another run are another curve."""
+    rows: list[list[float | None]]
+    fields: dict[str, Any] | None = None
+    """Arrays for curves, heat maps, matrices and bars, a few times a second."""
+
+
+class Status(Message):
+    """The state of the session; sent when it changes, and twice a second."""
+
+    type: Literal["status"] = "status"
+    run: int
+    t: float
+    params: dict[str, Value]
+    seed: int
+    running: bool
+    speed: float
+    real_time_factor: float
+    """Simulated seconds per second of the wall clock, over the last second."""
+    capped: bool
+    """The machine is too slow for the chosen speed: simulated time slows down."""
+    trouble: str
+    """Why the world stopped, in a sentence; empty while all is well."""
+    solver: str
+    """How the solver stands; empty where there is none."""
+    view: View
+
+
+class Notice(Message):
+    """Something happened that the page should say."""
+
+    type: Literal["notice"] = "notice"
+    state: Literal["live", "recovering", "failed", "ended"]
+    text: str

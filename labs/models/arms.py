@@ -1,0 +1,229 @@
+"""The arms: UR5, Panda and a double pendulum, as Pinocchio models with what draws them.
+
+The equation of motion of each is M(q) q'' + h(q, q') = tau (notes, 1.2), SI units, world frame
+with z up, the floor at z = 0. The URDFs leave out what a gear adds to the inertia felt at a
+joint, gear^2 J_rotor; in geared arms it dominates, so `model.armature` carries it.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from labs.errors import LabError
+
+Vector3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box centred at its frame; `size` is its full extent along x, y, z [m]."""
+
+    size: Vector3
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """A cylinder centred at its frame, its axis along z; radius and length [m]."""
+
+    radius: float
+    length: float
+
+
+@dataclass(frozen=True)
+class Sphere:
+    """A ball centred at its frame; radius [m]."""
+
+    radius: float
+
+
+Shape = Box | Cylinder | Sphere
+
+
+@dataclass(frozen=True)
+class Visual:
+    """One rigid piece of what an arm looks like: a mesh file or a primitive, never both."""
+
+    joint: int
+    """The joint it moves with, as an index of the model; 0 is the world."""
+    placement: pin.SE3
+    """Where it sits in that joint's frame."""
+    mesh: str
+    """Path of its mesh; empty for a primitive."""
+    scale: Vector3
+    """Scale of the mesh along x, y, z."""
+    shape: Shape | None
+    """The primitive; None for a mesh."""
+    color: Vector3
+    """Red, green, blue in [0, 1], for whatever brings no material of its own."""
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """A robot arm: how it moves, how strong it is and what it looks like."""
+
+    name: str
+    title: str
+    model: pin.Model
+    home: np.ndarray
+    """(nq,) [rad]: a bent posture, away from singularities and from the floor."""
+    torque_limit: np.ndarray
+    """(nv,) [N m]: what each motor can give, in either direction."""
+    tip: int
+    """The end-effector, as the index of a frame of the model."""
+    visuals: tuple[Visual, ...]
+    """What to draw when there is time to: detailed meshes with their materials."""
+    collisions: tuple[Visual, ...]
+    """Light-weight shapes, for ghosts and for machines that draw slowly."""
+    camera: tuple[Vector3, Vector3]
+    """Where a viewer stands and what it looks at [m]."""
+
+
+@cache
+def ur5() -> Arm:
+    """UR5, 6 joints. Reflected rotor inertia: gear 101 with J = 2.5e-5 kg m^2 gives
+    0.255 kg m^2 at the three large joints; the wrists' smaller motors give 0.061 kg m^2."""
+    model, collision, visual = _described("ur_description/urdf/ur5_robot.urdf")
+    model.armature = np.array([0.255, 0.255, 0.255, 0.061, 0.061, 0.061])
+    return Arm(
+        name="ur5",
+        title="UR5",
+        model=model,
+        home=np.array([0.0, -1.5, 1.6, -1.67, -1.57, 0.0]),
+        torque_limit=model.effortLimit.copy(),
+        tip=model.getFrameId("tool0"),
+        visuals=_visuals(visual),
+        collisions=_visuals(collision),
+        camera=((1.45, -1.25, 0.95), (0.2, 0.05, 0.36)),
+    )
+
+
+@cache
+def panda() -> Arm:
+    """Franka Panda, 7 joints, its fingers locked closed. Reflected rotor inertia 0.1 kg m^2 at
+    every joint, the order of what identifications of this arm find."""
+    full, collision, visual = _described("panda_description/urdf/panda.urdf")
+    fingers = [full.getJointId(f"panda_finger_joint{i}") for i in (1, 2)]
+    model, (collision, visual) = pin.buildReducedModel(
+        full, [collision, visual], fingers, pin.neutral(full)
+    )
+    model.armature = np.full(model.nv, 0.1)
+    return Arm(
+        name="panda",
+        title="Franka Panda",
+        model=model,
+        home=np.array([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]),
+        torque_limit=model.effortLimit.copy(),
+        tip=model.getFrameId("panda_hand_tcp"),
+        visuals=_visuals(visual),
+        collisions=_visuals(collision),
+        camera=((1.6, -1.35, 1.05), (0.12, 0.05, 0.42)),
+    )
+
+
+@cache
+def double_pendulum() -> Arm:
+    """Two uniform rods (0.5 m, 2 kg, radius 0.03 m) on horizontal hinges, driven directly (no
+    reflected inertia). At q = 0 it hangs straight down; a positive angle swings a rod towards
+    +y, and the second angle is relative to the first rod. It moves in the plane x = 0."""
+    length, radius, mass, height = 0.5, 0.03, 2.0, 1.3
+    model = pin.Model()
+    model.name = "double_pendulum"
+    hanging = pin.SE3(np.eye(3), np.array([0.0, 0.0, -length / 2]))
+    parent, hinge = 0, pin.SE3(np.eye(3), np.array([0.0, 0.0, height]))
+    visuals = [
+        _primitive(0, hinge * _shift(-0.06, 0.0, 0.0), Box((0.06, 0.14, 0.14)), (0.3, 0.32, 0.36))
+    ]
+    for name, color in (("shoulder", (0.16, 0.42, 0.76)), ("elbow", (0.88, 0.5, 0.16))):
+        parent = model.addJoint(parent, pin.JointModelRX(), hinge, name)
+        model.appendBodyToJoint(parent, pin.Inertia.FromCylinder(mass, radius, length), hanging)
+        visuals += [
+            _primitive(parent, hanging, Cylinder(radius, length), color),
+            _primitive(parent, pin.SE3.Identity(), Sphere(1.5 * radius), (0.3, 0.32, 0.36)),
+        ]
+        hinge = _shift(0.0, 0.0, -length)
+    visuals.append(_primitive(parent, hinge, Sphere(1.2 * radius), color))
+    tip = model.addFrame(pin.Frame("tip", parent, hinge, pin.FrameType.OP_FRAME))
+    return Arm(
+        name="double-pendulum",
+        title="Double pendulum",
+        model=model,
+        home=np.array([0.9, 0.6]),
+        torque_limit=np.array([100.0, 50.0]),
+        tip=tip,
+        visuals=tuple(visuals),
+        collisions=tuple(visuals),
+        camera=((2.6, 0.9, 1.35), (0.0, 0.2, 0.95)),
+    )
+
+
+ARMS: Mapping[str, Callable[[], Arm]] = {
+    "ur5": ur5,
+    "panda": panda,
+    "double-pendulum": double_pendulum,
+}
+
+
+def load(name: str) -> Arm:
+    """The arm of this name; the same object every time. Raises LabError, listing those there
+    are."""
+    try:
+        return ARMS[name]()
+    except KeyError:
+        raise LabError(f"no arm is named {name!r}; there are {', '.join(ARMS)}") from None
+
+
+def _described(urdf: str) -> tuple[pin.Model, pin.GeometryModel, pin.GeometryModel]:
+    """Model, collision and visual geometry of a URDF of example-robot-data."""
+    share = Path(pin.__file__).parents[4] / "share"
+    path = share / "example-robot-data" / "robots" / urdf
+    if not path.is_file():
+        raise LabError(
+            f"the robot description robots/{urdf} is not installed beside Pinocchio; "
+            "install the package example-robot-data"
+        )
+    model, collision, visual = pin.buildModelsFromUrdf(str(path), [str(share)])
+    return model, collision, visual
+
+
+def _visuals(geometry: pin.GeometryModel) -> tuple[Visual, ...]:
+    return tuple(
+        Visual(
+            joint=int(piece.parentJoint),
+            placement=piece.placement.copy(),
+            mesh="" if (shape := _shape(piece.geometry)) else str(piece.meshPath),
+            scale=_three(piece.meshScale),
+            shape=shape,
+            color=_three(piece.meshColor),
+        )
+        for piece in geometry.geometryObjects
+    )
+
+
+def _shape(geometry: Any) -> Shape | None:
+    """The primitive this collision geometry is; None for a mesh."""
+    match type(geometry).__name__:
+        case "Box":
+            return Box(_three(2 * geometry.halfSide))
+        case "Cylinder":
+            return Cylinder(float(geometry.radius), float(2 * geometry.halfLength))
+        case "Sphere":
+            return Sphere(float(geometry.radius))
+        case _:
+            return None
+
+
+def _three(values: Any) -> Vector3:
+    return float(values[0]), float(values[1]), float(values[2])
+
+
+def _primitive(joint: int, placement: pin.SE3, shape: Shape, color: Vector3) -> Visual:
+    return Visual(joint, placement, "", (1.0, 1.0, 1.0), shape, color)
+
+
+def _shift(x: float, y: float, z: float) -> pin.SE3:
+    return pin.SE3(np.eye(3), np.array([x, y, z]))

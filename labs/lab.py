@@ -26,6 +26,8 @@ class Action:
     name: str
     label: str
     help: str
+    group: str = ""
+    """The group of parameters its button stands with; empty: below all."""
 
 
 @dataclass(frozen=True)

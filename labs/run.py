@@ -1,0 +1,306 @@
+"""One run of a lab: the deterministic core that live sessions and headless runs share.
+
+A run is fixed by the lab, the parameters at t = 0, the seed, and the events: what was changed,
+pressed or dragged, and before which step. Wall-clock time appears nowhere.
+"""
+
+import shlex
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from labs.catalog import Entry, find
+from labs.errors import LabError, ParameterError
+from labs.lab import Inputs, Snapshot
+from labs.params import Value
+from labs.plots import Readout
+from labs.record import LIVE_ROWS, Recorder, Recording, versions
+
+MAX_EVENTS = 20_000
+MAX_STEPS = 2_000_000
+Point = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something done to the world before step `step`: parameters changed, an action pressed, a
+    handle held at a point or released (None), solver iterations taken in."""
+
+    step: int
+    kind: Literal["set", "press", "hold", "solve"]
+    name: str
+    value: Any = None
+
+
+class World:
+    """A lab in motion."""
+
+    def __init__(
+        self,
+        entry: Entry,
+        changes: Mapping[str, object] | None = None,
+        seed: int = 0,
+        capacity: int = LIVE_ROWS,
+    ) -> None:
+        self.entry = entry
+        self.lab = entry.lab
+        self.params = self.lab.Params().change(changes or {})
+        self.seed = seed
+        self._capacity = capacity
+        self.runs = 0
+        """Counts restarts."""
+        self.reset()
+
+    def reset(self) -> None:
+        """Back to t = 0 with the present parameters; recording and events begin anew."""
+        self.runs += 1
+        self.steps = 0
+        self.initial = self.params
+        self.events: list[Event] = []
+        self.complete = True
+        """False once events were dropped: the run can no longer be reproduced."""
+        self._actions: list[str] = []
+        self._handles: dict[str, Point] = {}
+        self.state = self.lab.init(self.params, np.random.default_rng(self.seed))
+        self.solution: Snapshot | None = None
+        self._solver = self._start_solver()
+        first = self.lab.measure(self.params, self.state)
+        scalars = [p.channel for p in self.lab.plots if isinstance(p, Readout)]
+        self.recorder = Recorder(first, scalars, self._capacity)
+        self.recorder.add(self.t, first)
+
+    @property
+    def t(self) -> float:
+        """Simulated time [s]."""
+        return self.steps * self.lab.period
+
+    @property
+    def trouble(self) -> str:
+        return self.state.trouble
+
+    def change(self, changes: Mapping[str, object]) -> None:
+        """New values for some parameters, seen from the next step on. Raises ParameterError."""
+        params = self.params.change(changes)
+        changed = params.differing(self.params)
+        if not changed:
+            return
+        self.params = params
+        effects = {params.tunables[name].effect for name in changed}
+        if "restart" in effects:
+            self.reset()
+            return
+        for name, value in changed.items():
+            self._note(Event(self.steps, "set", name, value))
+        if "solve" in effects:
+            self._solver = self._start_solver()
+
+    def press(self, action: str) -> None:
+        """Presses one of the lab's actions."""
+        names = [a.name for a in self.lab.actions]
+        if action not in names:
+            raise ParameterError(
+                f"no action is named {action!r}; there are {', '.join(names) or 'none'}"
+            )
+        self._actions.append(action)
+        self._note(Event(self.steps, "press", action))
+
+    def hold(self, handle: str, point: Point | None) -> None:
+        """A handle is held at a point [m], or released (None)."""
+        if point is None:
+            self._handles.pop(handle, None)
+        elif not np.all(np.isfinite(point)) or len(point) != 3:
+            raise ParameterError(f"{handle} was dragged to {point}: three finite numbers [m] go")
+        else:
+            self._handles[handle] = point
+        self._note(Event(self.steps, "hold", handle, point))
+
+    def advance(self) -> None:
+        """One period of simulated time, unless the world is in trouble."""
+        if self.state.trouble:
+            return
+        inputs = Inputs(tuple(self._actions), self._handles)
+        self._actions = []
+        self._handles = dict(self._handles)
+        self.state = self.lab.step(self.params, inputs, self.state)
+        self.steps += 1
+        self.recorder.add(self.t, self.lab.measure(self.params, self.state))
+
+    @property
+    def solving(self) -> bool:
+        """Whether the solver has iterations left."""
+        return self._solver is not None
+
+    def iterate(self) -> None:
+        """One iteration of the solver, taken into the state."""
+        if self._solver is None:
+            return
+        snapshot = next(self._solver, None)
+        if snapshot is None or snapshot.done:
+            self._solver = None
+        if snapshot is not None:
+            self.solution = snapshot
+            self.state = self.lab.accept(self.params, self.state, snapshot)
+            self._note(Event(self.steps, "solve", "iterate", 1))
+
+    def _start_solver(self) -> Iterator[Snapshot] | None:
+        return self.lab.solve(self.params, self.state) if self.lab.has_solver() else None
+
+    def _note(self, event: Event) -> None:
+        last = self.events[-1] if self.events else None
+        same = last and (last.step, last.kind, last.name) == (event.step, event.kind, event.name)
+        if last and same and event.kind == "solve":
+            self.events[-1] = Event(event.step, "solve", event.name, last.value + 1)
+        elif same and event.kind in ("set", "hold"):
+            self.events[-1] = event
+        elif len(self.events) < MAX_EVENTS:
+            self.events.append(event)
+        else:
+            self.complete = False
+
+    def recording(self) -> Recording:
+        """What was recorded so far, with all that reproduces it."""
+        rows = self.recorder.since(0)
+        about = {
+            "lab": self.entry.slug,
+            "seed": self.seed,
+            "period": self.lab.period,
+            "params": self.initial.model_dump(),
+            "changes": [
+                {"t": e.step * self.lab.period, "step": e.step, "kind": e.kind}
+                | {"name": e.name, "value": e.value}
+                for e in self.events
+            ],
+            "changes_complete": self.complete,
+            "covers": {"from": float(rows[0, 0]), "to": float(rows[-1, 0]), "rows": len(rows)},
+            "trouble": self.trouble,
+            "versions": versions(),
+        }
+        return Recording(about, self.recorder.columns, rows, self.recorder.channels())
+
+    def command(self) -> str:
+        """The `orclab run` line that reproduces this run up to now.
+
+        Raises LabError where a line cannot hold it (dragging, hundreds of changes)."""
+        if not self.complete or len(self.events) > 200:
+            raise LabError(
+                f"{len(self.events)} changes are too many for a command line: export the run as "
+                "JSON and use orclab run --replay FILE"
+            )
+        words = ["orclab", "run", self.entry.slug, "--seed", str(self.seed)]
+        words += ["--seconds", f"{self.t:.10g}"]
+        for name, value in self.initial.differing(self.lab.Params()).items():
+            words += ["--set", f"{name}={_text(value)}"]
+        for event in self.events:
+            at = f"{event.step * self.lab.period:.10g}"
+            match event.kind:
+                case "set":
+                    words += ["--at", at, f"{event.name}={_text(event.value)}"]
+                case "press":
+                    words += ["--at", at, f"press={event.name}"]
+                case "hold":
+                    where = "release" if event.value is None else ",".join(map(repr, event.value))
+                    words += ["--at", at, f"hold={event.name}:{where}"]
+                case "solve":
+                    words += ["--at", at, f"iterate={event.value}"]
+        return shlex.join(words)
+
+
+def run(
+    slug: str,
+    changes: Mapping[str, object] | None = None,
+    *,
+    seconds: float = 10.0,
+    seed: int = 0,
+    events: Iterable[Event] = (),
+    progress: Callable[[float], None] | None = None,
+) -> World:
+    """Runs a lab headless to the end of `seconds`, or to trouble.
+
+    `events` are applied before the step they name. A lab with a solver is solved to the end
+    before time starts, unless `events` say how far. `progress` hears the part done in [0, 1]."""
+    entry = find(slug)
+    period = entry.lab.period
+    if not 0 <= seconds <= MAX_STEPS * period:
+        raise ParameterError(
+            f"seconds = {seconds}: takes a number from 0 to {MAX_STEPS * period:g}"
+        )
+    steps = round(seconds / period) if entry.lab.has_world() else 0
+    todo = sorted(events, key=lambda event: event.step)
+    world = World(entry, changes, seed, capacity=steps + 1)
+    told = any(event.kind == "solve" for event in todo)
+    while world.solving and not told:
+        world.iterate()
+    for step in range(steps + 1):
+        while todo and todo[0].step <= step:
+            _apply(world, todo.pop(0))
+        if step == steps or world.trouble:
+            break
+        world.advance()
+        if progress and step % 100 == 0:
+            progress(step / steps)
+    if todo:
+        last = max(event.step for event in todo) * period
+        if not world.trouble:
+            raise ParameterError(f"a change at {last:g} s lies beyond the run's {seconds:g} s")
+    return world
+
+
+def events_of(about: Mapping[str, Any]) -> list[Event]:
+    """The events of an exported recording, to run it again."""
+    if not about["changes_complete"]:
+        raise LabError("this recording lost its early changes: it cannot be run again exactly")
+    return [Event(c["step"], c["kind"], c["name"], c["value"]) for c in about["changes"]]
+
+
+def parse_event(entry: Entry, at: str, what: str) -> Event:
+    """An event from a command line: `--at 2.5 kp=500`, `--at 3 press=push`,
+    `--at 4 hold=pull:0.1,0.2,0.3`, `--at 5 hold=pull:release`. Raises ParameterError."""
+    try:
+        step = round(float(at) / entry.lab.period)
+    except (ValueError, OverflowError):
+        raise ParameterError(f"--at {at}: takes a time in seconds") from None
+    name, equals, value = what.partition("=")
+    if not equals or step < 0:
+        raise ParameterError(f"--at {at} {what}: takes a time from 0 and name=value")
+    match name:
+        case "press":
+            return Event(step, "press", value)
+        case "hold":
+            handle, _, where = value.partition(":")
+            return Event(step, "hold", handle, _point(where))
+        case "iterate" if value.isdigit():
+            return Event(step, "solve", "iterate", int(value))
+        case _:
+            return Event(step, "set", name, entry.lab.Params.read({name: value})[name])
+
+
+def _point(text: str) -> Point | None:
+    if text == "release":
+        return None
+    try:
+        x, y, z = map(float, text.split(","))
+    except ValueError:
+        raise ParameterError(f"{text}: a handle is held at x,y,z or released") from None
+    return (x, y, z)
+
+
+def _apply(world: World, event: Event) -> None:
+    match event.kind:
+        case "set":
+            tunable = world.params.tunables.get(event.name)
+            if event.step and tunable and tunable.effect == "restart":
+                raise ParameterError(f"{event.name} restarts the run: give it with --set, not --at")
+            world.change({event.name: event.value})
+        case "press":
+            world.press(event.name)
+        case "hold":
+            world.hold(event.name, event.value and tuple(event.value))
+        case "solve":
+            for _ in range(event.value):
+                world.iterate()
+
+
+def _text(value: Value) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -1,0 +1,48 @@
+"""The one place where everything the user does waits for the loop."""
+
+import threading
+from collections import deque
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass
+class Item:
+    """One thing to do."""
+
+    do: str
+    ref: int | None
+    arguments: dict[str, Any]
+
+
+class Mailbox:
+    """Slider callbacks, page buttons, drags and the API put; the loop takes, once a frame.
+
+    Neighbouring changes of parameters, and of one handle, merge: the latest wins."""
+
+    def __init__(self) -> None:
+        self._items: deque[Item] = deque()
+        self._arrived = threading.Condition()
+
+    def put(self, do: str, ref: int | None = None, **arguments: Any) -> None:
+        """From any thread: what to do, with what; one with a `ref` expects an answer."""
+        with self._arrived:
+            last = self._items[-1] if self._items else None
+            if last and last.do == do and last.ref is None and ref is None:
+                if do == "params":
+                    last.arguments["changes"] |= arguments["changes"]
+                    return
+                if do == "hold" and last.arguments["handle"] == arguments["handle"]:
+                    last.arguments["point"] = arguments["point"]
+                    return
+            self._items.append(Item(do, ref, arguments))
+            self._arrived.notify()
+
+    def take(self, timeout: float) -> list[Item]:
+        """All that waits; sleeps up to `timeout` seconds for the first to come."""
+        with self._arrived:
+            if not self._items and timeout > 0:
+                self._arrived.wait(timeout)
+            items = list(self._items)
+            self._items.clear()
+            return items

@@ -1,0 +1,59 @@
+"""The pipe between the web process and a worker: frames on a socket pair.
+
+A frame is its length (4 bytes, big endian), a kind (1 byte) and a JSON payload. Frames of kind
+STREAM go to the page's viewers as they are: the web process does not look inside."""
+
+import socket
+import struct
+import threading
+from typing import Any
+
+import orjson
+
+HEADER = struct.Struct(">IB")
+STREAM, STATUS, CONTROL = range(3)
+"""STREAM: for the viewers. STATUS: for the viewers, and kept. CONTROL: for the web process."""
+
+
+def frame(kind: int, payload: bytes) -> bytes:
+    """The bytes of one frame."""
+    return HEADER.pack(len(payload), kind) + payload
+
+
+def encode(message: Any) -> bytes:
+    """JSON; arrays become lists, NaN becomes null."""
+    return orjson.dumps(message, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS)
+
+
+class Link:
+    """The worker's end."""
+
+    def __init__(self, sock: socket.socket) -> None:
+        self._socket = sock
+        self._lock = threading.Lock()
+
+    def send(self, kind: int, message: Any) -> None:
+        """Sends one frame, from any thread. Raises OSError once the web process is gone."""
+        data = frame(kind, encode(message))
+        with self._lock:
+            self._socket.sendall(data)
+
+    def receive(self) -> dict[str, Any] | None:
+        """The next message from the web process; None once it is gone."""
+        header = self._read(HEADER.size)
+        if header is None:
+            return None
+        payload = self._read(HEADER.unpack(header)[0])
+        return None if payload is None else orjson.loads(payload)
+
+    def _read(self, count: int) -> bytes | None:
+        data = bytearray()
+        while len(data) < count:
+            try:
+                part = self._socket.recv(count - len(data))
+            except OSError:
+                return None
+            if not part:
+                return None
+            data += part
+        return bytes(data)

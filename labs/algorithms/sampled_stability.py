@@ -1,0 +1,174 @@
+"""Why a sampled control loop diverges: the gains, the control period, or the integrator.
+
+Near a resting reference the robot is x' = A x + B u, x = (dq, dv), and the controller
+u = -K x + k_z z, z' = -dq (notes, 1.2; the rest is standard sampled-data control, e.g. Åström
+and Wittenmark, Computer-Controlled Systems). Three loops are compared by their growth rate
+sigma [1/s], the error going as exp(sigma t):
+
+1. continuous control     eigenvalues s of [[A - B K, B k_z], [-C, 0]],   sigma = max Re s
+2. torque held for T      x+ = Phi x + Gamma u, z+ = z - T C x with
+                          Phi = exp(A T), Gamma = int_0^T exp(A s) ds B,
+                          eigenvalues m of the closed loop,   sigma = log max |m| / T
+3. as it is simulated     the same with Phi and Gamma made by T/h steps of the integrator
+
+The integral z takes part only where the law has one. The first of the three that grows nearly
+as fast as the last is at fault.
+"""
+
+from dataclasses import dataclass
+from math import factorial
+
+import numpy as np
+import pinocchio as pin
+from scipy.linalg import expm
+
+from labs.algorithms.integrators import INTEGRATORS
+from labs.algorithms.joint_control import Gains, linearised, mass_matrix
+
+GROWS = 1e-3
+"""[1/s] growth below this is not told from none: at a pole on the stability boundary, rounding
+alone is worth that much."""
+
+NEARLY = 0.6
+"""A loop that grows at least this fast, as a share of the simulated one, explains it. With
+k_d = 0 and T = h explicit Euler grows twice as fast as holding the torque alone would."""
+
+
+@dataclass(frozen=True)
+class Robot:
+    """The robot near a posture: M dq'' + F dq' + G dq = d tau, each (nv, nv), G = dg/dq."""
+
+    mass: np.ndarray
+    friction: np.ndarray
+    gravity: np.ndarray
+
+    @classmethod
+    def near(cls, model: pin.Model, data: pin.Data, q: np.ndarray, friction: float) -> "Robot":
+        """Linearised at rest at q (nq,), with viscous `friction` [N m s/rad] at every joint."""
+        gravity = pin.computeGeneralizedGravityDerivatives(model, data, q)
+        return cls(mass_matrix(model, data, q), friction * np.eye(model.nv), gravity.copy())
+
+    def dynamics(self) -> tuple[np.ndarray, np.ndarray]:
+        """A (2n, 2n) and B (2n, n)."""
+        n = len(self.mass)
+        inverse = np.linalg.inv(self.mass)
+        a = np.block(
+            [
+                [np.zeros((n, n)), np.eye(n)],
+                [-inverse @ self.gravity, -inverse @ self.friction],
+            ]
+        )
+        return a, np.vstack([np.zeros((n, n)), inverse])
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What a loop consists of, besides the robot. Times in seconds; `period` is the time
+    between ticks and a whole number of steps."""
+
+    controller: str
+    gains: Gains
+    period: float
+    integrator: str
+    step: float
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The growth rates [1/s] of the three loops, and which is at fault: "gains", "period",
+    "integrator", or "" when the simulated loop is stable near the reference."""
+
+    continuous: float
+    sampled: float
+    simulated: float
+    fault: str
+
+
+@dataclass(frozen=True)
+class LinearLoop:
+    """A robot and its controller near a posture; `model` is the controller's."""
+
+    robot: Robot
+    model: pin.Model
+    data: pin.Data
+    q: np.ndarray
+
+    def poles(self, setting: Setting) -> np.ndarray:
+        """Eigenvalues [1/s] of the loop under continuous control."""
+        a, b = self.robot.dynamics()
+        return np.linalg.eigvals(self._closed(setting, a, b, 1.0, sampled=False))
+
+    def multipliers(self, setting: Setting, *, exact: bool = False) -> np.ndarray:
+        """Eigenvalues of the map over one control period, the robot's motion between ticks
+        integrated as set, or exactly."""
+        a, b = self.robot.dynamics()
+        phi, gamma = (
+            exactly_held(a, b, setting.period)
+            if exact
+            else integrated(setting.integrator, setting.step, a, b, setting.period)
+        )
+        return np.linalg.eigvals(self._closed(setting, phi, gamma, setting.period, sampled=True))
+
+    def growth(self, setting: Setting, *, exact: bool = False) -> float:
+        """sigma [1/s] of the sampled loop."""
+        radius = float(np.abs(self.multipliers(setting, exact=exact)).max())
+        return float(np.log(max(radius, 1e-300))) / setting.period
+
+    def diagnose(self, setting: Setting) -> Diagnosis:
+        """Which of the three loops is the first to be at fault."""
+        continuous = float(self.poles(setting).real.max())
+        sampled, simulated = self.growth(setting, exact=True), self.growth(setting)
+        rates = {"gains": continuous, "period": sampled, "integrator": simulated}
+        fault = ""
+        if simulated > GROWS:
+            fault = next(name for name, rate in rates.items() if rate >= NEARLY * simulated)
+        return Diagnosis(continuous, sampled, simulated, fault)
+
+    def _closed(
+        self, setting: Setting, phi: np.ndarray, gamma: np.ndarray, period: float, *, sampled: bool
+    ) -> np.ndarray:
+        """x and z together: u = -K x + k_z z, and z' = -dq or z+ = z - T dq."""
+        law = linearised(setting.controller, self.model, self.data, setting.gains, self.q)
+        n = len(self.q)
+        from_x = phi - gamma @ np.hstack([law.k_q, law.k_v])
+        if not law.k_z.any():
+            return from_x
+        to_z = np.hstack([-period * np.eye(n), np.zeros((n, n))])
+        return np.block([[from_x, gamma @ law.k_z], [to_z, np.eye(n) * sampled]])
+
+
+def exactly_held(a: np.ndarray, b: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
+    """Phi = exp(A T) and Gamma = int_0^T exp(A s) ds B, both from one exponential."""
+    n, m = b.shape
+    both = expm(np.block([[a, b], [np.zeros((m, n + m))]]) * period)
+    return both[:n, :n], both[:n, n:]
+
+
+def integrated(
+    integrator: str, step: float, a: np.ndarray, b: np.ndarray, period: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Phi and Gamma as this integrator makes them, in period/step steps with u held."""
+    p, q = one_step(integrator, step, a, b)
+    n, m = b.shape
+    both = np.block([[p, q], [np.zeros((m, n)), np.eye(m)]])
+    power = np.linalg.matrix_power(both, round(period / step))
+    return power[:n, :n], power[:n, n:]
+
+
+def one_step(
+    integrator: str, h: float, a: np.ndarray, b: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """P and Q of x+ = P x + Q u over one step. A Runge-Kutta method of as many stages as its
+    order p (up to 4) has P = sum_(k<=p) (hA)^k / k! and Q = h sum_(k<p) (hA)^k / (k+1)! B."""
+    eye = np.eye(len(a))
+    if integrator == "semi-implicit-euler":
+        half = len(a) // 2
+        drift = eye + h * np.eye(len(a), k=half)
+        kick = eye.copy()
+        kick[half:] += h * a[half:]
+        return drift @ kick, drift @ (h * b)
+    order = INTEGRATORS[integrator].order
+    powers = [np.linalg.matrix_power(h * a, k) for k in range(order + 1)]
+    p = sum(power / factorial(k) for k, power in enumerate(powers))
+    q = sum(power / factorial(k + 1) for k, power in enumerate(powers[:-1]))
+    return np.asarray(p), h * np.asarray(q) @ b

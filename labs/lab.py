@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 
 import numpy as np
 
+from labs.errors import ParameterError
 from labs.params import Params, Value
 from labs.plots import Plot
 from labs.scene import Scene
@@ -112,6 +113,15 @@ class Lab(abc.ABC, Generic[P, S]):
     @abc.abstractmethod
     def draw(self, scene: Scene, params: P, state: S) -> None:
         """Draws one frame."""
+
+    @classmethod
+    def check_action(cls, name: str) -> None:
+        """Raises ParameterError unless an action has this name."""
+        names = [action.name for action in cls.actions]
+        if name not in names:
+            raise ParameterError(
+                f"no action is named {name!r}; there are {', '.join(names) or 'none'}"
+            )
 
     @classmethod
     def has_world(cls) -> bool:

@@ -1,4 +1,4 @@
-"""The recording of a run: every step's measurements, in bounded memory, and how to write it down."""
+"""The recording of a run: every step's measurements in bounded memory, and how to write it."""
 
 import csv
 import io

@@ -98,11 +98,7 @@ class World:
 
     def press(self, action: str) -> None:
         """Presses one of the lab's actions."""
-        names = [a.name for a in self.lab.actions]
-        if action not in names:
-            raise ParameterError(
-                f"no action is named {action!r}; there are {', '.join(names) or 'none'}"
-            )
+        self.lab.check_action(action)
         self._actions.append(action)
         self._note(Event(self.steps, "press", action))
 

@@ -113,6 +113,33 @@ class SessionInfo(Message):
     """Path of the WebSocket that tells what happens."""
 
 
+class LabInfo(Message):
+    slug: str
+    title: str
+    section: str
+    summary: str
+    chapter: str
+    params: list[dict[str, Any]]
+    presets: dict[str, dict[str, Value]]
+    actions: list[str]
+
+
+class ParamValues(Message):
+    params: dict[str, Value]
+
+
+class CommandLine(Message):
+    command: str
+
+
+class Health(Message):
+    status: Literal["ok"]
+    version: str
+    sessions: int
+    workers: int
+    spares: int
+
+
 class Problem(Message):
     """What every refused request answers."""
 

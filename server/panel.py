@@ -3,7 +3,7 @@
 A logarithmic knob is two rows: a number with its true value, and a slider over its logarithm."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from itertools import groupby
 from typing import Any
 
@@ -105,7 +105,7 @@ class Panel:
         labels = [str(text) for text in choice.options.values()]
         values = list(choice.options)
         box = self._gui.add_dropdown(
-            _label(choice), labels, labels[values.index(value)], hint=choice.help
+            _label(choice), labels, initial_value=labels[values.index(value)], hint=choice.help
         )
         return self._wire(
             box,

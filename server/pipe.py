@@ -1,7 +1,7 @@
 """The pipe between the web process and a worker: frames on a socket pair.
 
-A frame is its length (4 bytes, big endian), a kind (1 byte) and a JSON payload. Frames of kind
-STREAM go to the page's viewers as they are: the web process does not look inside."""
+A frame is its length (4 bytes, big endian), a kind (1 byte) and a JSON payload. All but CONTROL
+frames go on to the page's viewers as they are: the web process does not look inside STREAM."""
 
 import socket
 import struct
@@ -11,8 +11,8 @@ from typing import Any
 import orjson
 
 HEADER = struct.Struct(">IB")
-STREAM, STATUS, CONTROL = range(3)
-"""STREAM: for the viewers. STATUS: for the viewers, and kept. CONTROL: for the web process."""
+STREAM, HELLO, STATUS, CONTROL = range(4)
+"""STREAM: telemetry. HELLO, STATUS: the latest is kept. CONTROL: for the web process."""
 
 
 def frame(kind: int, payload: bytes) -> bytes:

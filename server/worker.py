@@ -29,7 +29,7 @@ from labs.run import World
 from server.mailbox import Item, Mailbox
 from server.messages import Hello, Status, Telemetry, View
 from server.panel import Panel
-from server.pipe import CONTROL, STATUS, STREAM, Link
+from server.pipe import CONTROL, HELLO, STATUS, STREAM, Link
 from server.viser_scene import ViserScene
 
 FRAME = 1 / 60
@@ -259,7 +259,7 @@ class Live:
 
     def _hello(self) -> None:
         hello = Hello(columns=self.world.recorder.columns, period=self.world.lab.period)
-        self.link.send(STREAM, hello.model_dump())
+        self.link.send(HELLO, hello.model_dump())
 
     def _telemetry(self, now: float) -> None:
         rows = self.world.recorder.since(self._sent_rows)

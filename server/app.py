@@ -1,0 +1,272 @@
+"""The web application: the API, the pages, the stream and the scenes."""
+
+import asyncio
+import contextlib
+import tempfile
+from collections.abc import AsyncIterator
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Body, FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import FileResponse, JSONResponse
+from starlette.background import BackgroundTask
+from starlette.exceptions import HTTPException
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from labs.catalog import catalog, find
+from labs.errors import LabError, UnknownLab
+from labs.params import Params
+from labs.record import versions
+from server import pages, proxy
+from server.guard import BodyTooLarge, Guard
+from server.messages import (
+    Apply,
+    Changes,
+    Command,
+    CommandLine,
+    Health,
+    LabInfo,
+    NewSession,
+    ParamValues,
+    Press,
+    Problem,
+    SessionInfo,
+)
+from server.sessions import NoSession, NotNow, Session, Sessions, SessionsFull, Viewer
+from server.settings import Settings
+from server.supervisor import Supervisor
+
+SEND_SECONDS = 20.0
+"""A viewer that takes this long for one message has left."""
+ENDED = 4404
+
+STATUS_OF: dict[type[LabError], tuple[int, str]] = {
+    UnknownLab: (404, "unknown-lab"),
+    NoSession: (404, "no-session"),
+    SessionsFull: (503, "full"),
+    NotNow: (503, "not-now"),
+    LabError: (422, "invalid"),
+}
+PROBLEMS: dict[int | str, dict[str, Any]] = {
+    status: {"model": Problem, "description": text}
+    for status, text in (
+        (400, "The body is not JSON"),
+        (403, "Wrong Host or Origin"),
+        (404, "No such lab or session"),
+        (413, "The body is too large"),
+        (422, "Refused, and why"),
+        (503, "No place, or not now"),
+    )
+}
+
+api = APIRouter(prefix="/api", responses=PROBLEMS)
+
+
+def create_app(settings: Settings | None = None) -> FastAPI:
+    """The application; its workers live as long as it runs."""
+    settings = settings or Settings()
+    catalog()  # a broken lab shows now, not at the first request
+
+    @contextlib.asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        supervisor = Supervisor(settings)
+        sessions = Sessions(settings, supervisor)
+        with tempfile.TemporaryDirectory(prefix="orclab-") as folder:
+            app.state.supervisor, app.state.sessions = supervisor, sessions
+            app.state.folder = Path(folder)
+            supervisor.start()
+            sessions.start()
+            yield
+            await sessions.stop()
+            await supervisor.stop()
+
+    app = FastAPI(
+        title="orclab",
+        version=versions()["orclab"],
+        summary="An interactive lab for optimization-based robot control.",
+        lifespan=lifespan,
+    )
+    app.add_middleware(Guard, settings=settings)
+    app.include_router(api)
+    app.include_router(health)
+    app.include_router(proxy.router)
+    pages.install(app)
+    app.add_exception_handler(LabError, _refused)
+    app.add_exception_handler(RequestValidationError, _not_valid)
+    app.add_exception_handler(HTTPException, _http_error)
+    app.add_exception_handler(BodyTooLarge, _too_large)
+    return app
+
+
+health = APIRouter()
+
+
+@health.get("/healthz")
+async def healthz(request: Request) -> Health:
+    """Whether the server is well, and how busy."""
+    state = request.app.state
+    return Health(
+        status="ok",
+        version=versions()["orclab"],
+        sessions=len(state.sessions),
+        workers=state.supervisor.count,
+        spares=state.supervisor.spares,
+    )
+
+
+@api.get("/labs")
+async def list_labs() -> list[LabInfo]:
+    """All labs in the order of the course, with their parameters."""
+    return [
+        LabInfo(
+            slug=slug,
+            title=entry.lab.title,
+            section=entry.lab.section,
+            summary=entry.lab.summary,
+            chapter=f"{entry.chapter} {entry.chapter_title}",
+            params=entry.lab.Params.describe(),
+            presets={name: dict(values) for name, values in entry.lab.presets.items()},
+            actions=[action.name for action in entry.lab.actions],
+        )
+        for slug, entry in catalog().items()
+    ]
+
+
+@api.post("/sessions", status_code=201)
+async def create_session(request: Request, new: NewSession) -> SessionInfo:
+    """Opens a lab."""
+    session = await _sessions(request).create(find(new.lab), new)
+    return session.info()
+
+
+@api.get("/sessions/{session_id}")
+async def get_session(request: Request, session_id: str) -> SessionInfo:
+    """Where a session stands."""
+    return _session(request, session_id).info()
+
+
+@api.delete("/sessions/{session_id}", status_code=204)
+async def delete_session(request: Request, session_id: str) -> None:
+    """Ends a session."""
+    await _sessions(request).delete(session_id)
+
+
+@api.patch("/sessions/{session_id}/params")
+async def change_params(
+    request: Request, session_id: str, changes: Annotated[Changes, Body()]
+) -> ParamValues:
+    """Changes some parameters, all or nothing; answers all of them."""
+    return ParamValues(params=await _session(request, session_id).change(changes))
+
+
+@api.post("/sessions/{session_id}/commands", status_code=204)
+async def command(request: Request, session_id: str, command: Annotated[Command, Body()]) -> None:
+    """Run, pause, step, reset, speed, seed, apply, press, view."""
+    session = _session(request, session_id)
+    if isinstance(command, Apply):
+        defaults: Params = session.entry.lab.Params()
+        defaults.change(command.params)
+    if isinstance(command, Press):
+        session.entry.lab.check_action(command.action)
+    await session.ask(command.command, **command.model_dump(exclude={"command"}))
+
+
+@api.get("/sessions/{session_id}/command")
+async def command_line(request: Request, session_id: str) -> CommandLine:
+    """The `orclab run` line that reproduces what was recorded."""
+    return CommandLine(command=await _session(request, session_id).ask("command_line"))
+
+
+@api.get(
+    "/sessions/{session_id}/export.{form}",
+    response_class=FileResponse,
+    responses={200: {"content": {"application/octet-stream": {}}}},
+)
+async def export(
+    request: Request, session_id: str, form: Literal["json", "csv", "npz"]
+) -> FileResponse:
+    """The recorded run: channels, parameters and their changes, versions, what it covers."""
+    session = _session(request, session_id)
+    with tempfile.NamedTemporaryFile(dir=request.app.state.folder, delete=False) as file:
+        path = Path(file.name)
+    try:
+        await session.write(form, str(path))
+    except BaseException:
+        path.unlink()
+        raise
+    return FileResponse(
+        path,
+        filename=f"{session.entry.slug}.{form}",
+        background=BackgroundTask(path.unlink),
+    )
+
+
+@api.websocket("/sessions/{session_id}/stream")
+async def stream(socket: WebSocket, session_id: str) -> None:
+    """What happens in a session: hello, telemetry, status, notices."""
+    await socket.accept()
+    sessions: Sessions = socket.app.state.sessions
+    try:
+        session = sessions.find(session_id)
+    except NoSession as error:
+        await socket.close(ENDED, str(error)[:120])
+        return
+    viewer = session.join()
+    sending = asyncio.create_task(_send(socket, viewer))
+    try:
+        while (await socket.receive())["type"] != "websocket.disconnect":
+            pass  # A page has nothing to say here: it uses the API.
+    except (WebSocketDisconnect, RuntimeError):
+        pass  # It left in the middle of a message.
+    finally:
+        session.leave(viewer)
+        sending.cancel()
+
+
+async def _send(socket: WebSocket, viewer: Viewer) -> None:
+    with contextlib.suppress(WebSocketDisconnect, RuntimeError, TimeoutError):
+        async for payload in viewer.messages():
+            await asyncio.wait_for(socket.send_text(payload.decode()), SEND_SECONDS)
+    with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+        await socket.close(ENDED)
+
+
+def _sessions(request: Request) -> Sessions:
+    sessions: Sessions = request.app.state.sessions
+    return sessions
+
+
+def _session(request: Request, session_id: str) -> Session:
+    return _sessions(request).find(session_id)
+
+
+async def _refused(_: Request, error: Exception) -> Response:
+    for kind in type(error).__mro__:
+        if kind in STATUS_OF:
+            status, code = STATUS_OF[kind]
+            return _problem(status, str(error), code)
+    raise error
+
+
+async def _not_valid(_: Request, error: Exception) -> Response:
+    assert isinstance(error, RequestValidationError)
+    sentences = [
+        f"{'.'.join(str(part) for part in e['loc'][1:]) or 'body'}: {e['msg']}"
+        for e in error.errors()[:5]
+    ]
+    return _problem(422, "; ".join(sentences), "invalid")
+
+
+async def _http_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    sentence = f"{request.method} {request.url.path[:200]}: {error.detail}"
+    return _problem(error.status_code, sentence, "http", error.headers)
+
+
+async def _too_large(_: Request, error: Exception) -> Response:
+    return _problem(413, str(error), "too-large")
+
+
+def _problem(status: int, error: str, code: str, headers: Any = None) -> Response:
+    return JSONResponse({"error": error, "code": code}, status, headers)

@@ -1,0 +1,212 @@
+"""The `orclab` command: serve the labs, list them, run one headless."""
+
+import argparse
+import asyncio
+import json
+import socket
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from labs.catalog import catalog, find
+from labs.errors import LabError
+from labs.record import versions
+from labs.run import Event, events_of, parse_event, run
+
+FORMS = ("json", "csv", "npz")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Returns the exit code: 0, or 2 for wrong use."""
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    try:
+        return {"serve": _serve, "list": _list, "run": _run}[options.command or "serve"](options)
+    except LabError as error:
+        print(f"orclab: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 130
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="orclab", description="An interactive lab for optimization-based robot control."
+    )
+    parser.add_argument("--version", action="version", version=versions()["orclab"])
+    _serving(parser)
+    commands = parser.add_subparsers(dest="command", metavar="{serve,list,run}")
+    _serving(commands.add_parser("serve", help="serve the labs (what orclab alone does)"))
+    commands.add_parser("list", help="list the labs")
+    runner = commands.add_parser(
+        "run",
+        help="run a lab headless",
+        description="Prints the final measurements as one JSON object; progress goes to stderr.",
+    )
+    runner.add_argument("lab", nargs="?", help="a lab's name, as orclab list prints it")
+    runner.add_argument(
+        "--set", action="append", default=[], metavar="K=V", help="a parameter at t = 0"
+    )
+    runner.add_argument(
+        "--at",
+        action="append",
+        default=[],
+        nargs=2,
+        metavar=("T", "K=V"),
+        help="a change at T seconds: a parameter, press=ACTION, hold=HANDLE:x,y,z or "
+        "hold=HANDLE:release",
+    )
+    runner.add_argument("--seconds", type=float, help="simulated time (10)")
+    runner.add_argument("--seed", type=int, help="seed of all randomness (0)")
+    runner.add_argument("--replay", type=Path, metavar="F.json", help="run an exported run again")
+    runner.add_argument(
+        "--out", type=Path, metavar="F", help="write the trajectory: F.json, F.csv or F.npz"
+    )
+    return parser
+
+
+def _serving(parser: argparse.ArgumentParser) -> None:
+    for flag, kind, help in (
+        ("--host", str, "address to listen on (127.0.0.1)"),
+        ("--port", int, "port to listen on (8000; 0: any free one)"),
+    ):
+        parser.add_argument(flag, type=kind, default=argparse.SUPPRESS, help=help)
+    parser.add_argument(
+        "--open", action="store_true", default=argparse.SUPPRESS, help="open the browser"
+    )
+
+
+def _serve(options: argparse.Namespace) -> int:
+    import uvicorn  # on demand: a headless run needs no web server
+
+    from server.app import create_app
+    from server.settings import Settings
+
+    given = {name: getattr(options, name) for name in ("host", "port") if name in options}
+    settings = Settings(**given)
+    listener = _listen(settings.host, settings.port)
+    host, port = listener.getsockname()[:2]
+    shown = f"[{host}]" if ":" in host else host
+    address = f"http://{shown}:{port}"
+    config = uvicorn.Config(
+        create_app(settings),
+        loop="uvloop",
+        ws="websockets-sansio",
+        ws_max_size=64 * 2**20,
+        ws_per_message_deflate=False,
+        log_level="warning",
+        timeout_graceful_shutdown=2,
+        server_header=False,
+    )
+    server = uvicorn.Server(config)
+
+    async def announce() -> None:
+        while not server.started:
+            await asyncio.sleep(0.02)
+        print(f"orclab is at {address}  (Ctrl+C ends it)", flush=True)
+        if getattr(options, "open", False):
+            import webbrowser
+
+            await asyncio.to_thread(webbrowser.open, address)
+
+    async def serve() -> None:
+        announcing = asyncio.create_task(announce())
+        await server.serve([listener])
+        announcing.cancel()
+
+    with asyncio.Runner(loop_factory=config.get_loop_factory()) as runner:
+        runner.run(serve())
+    return 0
+
+
+def _listen(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    listener = socket.socket(family, socket.SOCK_STREAM)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listener.bind((host, port))
+    except OSError as error:
+        listener.close()
+        raise LabError(
+            f"cannot listen on {host} port {port} ({error.strerror}): "
+            "choose another with --port, or --port 0 for any free one"
+        ) from None
+    return listener
+
+
+def _list(_: argparse.Namespace) -> int:
+    for slug, entry in catalog().items():
+        print(f"{slug:24} {entry.lab.section:8} {entry.lab.title}: {entry.lab.summary}")
+    return 0
+
+
+def _run(options: argparse.Namespace) -> int:
+    form = options.out.suffix[1:] if options.out else ""
+    if options.out and form not in FORMS:
+        raise LabError(f"--out {options.out}: the file is named F.json, F.csv or F.npz")
+    if options.out and not options.out.parent.is_dir():
+        raise LabError(f"--out {options.out}: there is no folder {options.out.parent}")
+    plan = _replayed(options.replay) if options.replay else _planned(options)
+    if options.seconds is not None:
+        plan["seconds"] = options.seconds
+    world = run(**plan, progress=_progress if sys.stderr.isatty() else None)
+    if options.out:
+        options.out.write_bytes(world.recording().write(form))
+        print(f"wrote {options.out}", file=sys.stderr)
+    if world.trouble:
+        print(world.trouble, file=sys.stderr)
+    measured = {
+        name: value if isinstance(value, float | int) else value.tolist()
+        for name, value in world.lab.measure(world.params, world.state).items()
+    }
+    final = {"lab": world.entry.slug, "seed": world.seed, "t": world.t, "trouble": world.trouble}
+    print(json.dumps(final | measured))
+    return 0
+
+
+def _planned(options: argparse.Namespace) -> dict[str, Any]:
+    if options.lab is None:
+        raise LabError(f"say which lab to run: {', '.join(catalog())}")
+    entry = find(options.lab)
+    texts = dict(_pair(text) for text in options.set)
+    return {
+        "slug": options.lab,
+        "changes": entry.lab.Params.read(texts),
+        "seed": _seed(options.seed),
+        "events": [parse_event(entry, at, what) for at, what in options.at],
+    }
+
+
+def _replayed(path: Path) -> dict[str, Any]:
+    try:
+        about = json.loads(path.read_bytes())
+        events: list[Event] = events_of(about)
+        return {
+            "slug": about["lab"],
+            "changes": about["params"],
+            "seed": about["seed"],
+            "seconds": about["covers"]["to"],
+            "events": events,
+        }
+    except OSError as error:
+        raise LabError(f"--replay {path}: {error.strerror}") from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise LabError(f"--replay {path}: not a JSON export of orclab ({error!r})") from None
+
+
+def _seed(seed: int | None) -> int:
+    if seed is not None and not 0 <= seed < 2**32:
+        raise LabError(f"--seed {seed}: takes a whole number from 0 to {2**32 - 1}")
+    return seed or 0
+
+
+def _pair(text: str) -> tuple[str, str]:
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise LabError(f"--set {text}: write name=value")
+    return name, value
+
+
+def _progress(part: float) -> None:
+    print(f"\r{100 * part:3.0f} %", end="\r", file=sys.stderr, flush=True)

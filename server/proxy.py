@@ -1,0 +1,113 @@
+"""The way to a session's 3D scene: Viser's page, and its WebSocket relayed to the worker.
+
+One message in, one out, and no queue in between: a viewer that reads slowly slows only the
+stream it reads, and Viser merges what waits there."""
+
+import asyncio
+import gzip
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+
+import websockets
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import HTMLResponse
+from starlette.websockets import WebSocket, WebSocketDisconnect
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.typing import Subprotocol
+
+from server.sessions import NoSession, Sessions
+
+router = APIRouter(include_in_schema=False)
+
+GONE, TRY_AGAIN = 4404, 1013
+
+
+@cache
+def viser_page() -> tuple[bytes, bytes]:
+    """Viser's client, one HTML file: as it is, and compressed."""
+    spec = find_spec("viser")
+    assert spec is not None
+    assert spec.origin is not None
+    page = (Path(spec.origin).parent / "client" / "build" / "index.html").read_bytes()
+    return page, gzip.compress(page)
+
+
+@router.get("/scene/{session_id}/")
+async def scene_page(request: Request, session_id: str) -> Response:
+    """The scene's page, for an iframe. It finds its WebSocket from its own address."""
+    sessions: Sessions = request.app.state.sessions
+    try:
+        sessions.find(session_id)
+    except NoSession as error:
+        return HTMLResponse(f"<!doctype html><title>No scene</title><p>{error}</p>", 404)
+    plain, compressed = viser_page()
+    headers = {"Cache-Control": "no-cache", "X-Frame-Options": "SAMEORIGIN"}
+    if "gzip" in request.headers.get("accept-encoding", ""):
+        return HTMLResponse(compressed, headers=headers | {"Content-Encoding": "gzip"})
+    return HTMLResponse(plain, headers=headers)
+
+
+@router.websocket("/scene/{session_id}")
+async def scene_socket(socket: WebSocket, session_id: str) -> None:
+    """Relays Viser's protocol between a browser and the session's worker."""
+    sessions: Sessions = socket.app.state.sessions
+    offered = [p for p in socket.scope["subprotocols"] if p.startswith("viser-v")]
+    try:
+        worker = sessions.find(session_id).worker
+    except NoSession as error:
+        await socket.accept(offered[0] if offered else None)
+        await socket.close(GONE, str(error)[:120])
+        return
+    if worker is None or worker.gone or not offered:
+        await socket.close(TRY_AGAIN)
+        return
+    try:
+        async with connect(
+            f"ws://127.0.0.1:{worker.port}",
+            subprotocols=[Subprotocol(offered[0])],
+            max_size=None,
+            max_queue=4,
+            compression=None,
+            ping_interval=None,
+            proxy=None,
+        ) as upstream:
+            await socket.accept(offered[0])
+            await _relay(socket, upstream)
+    except (OSError, websockets.InvalidHandshake):
+        await socket.close(TRY_AGAIN)
+
+
+async def _relay(socket: WebSocket, upstream: ClientConnection) -> None:
+    """Both directions until either ends, then the other is ended too."""
+    directions = [
+        asyncio.create_task(_to_worker(socket, upstream)),
+        asyncio.create_task(_to_browser(socket, upstream)),
+    ]
+    try:
+        await asyncio.wait(directions, return_when=asyncio.FIRST_COMPLETED)
+    finally:
+        for direction in directions:
+            direction.cancel()
+        results = await asyncio.gather(*directions, return_exceptions=True)
+    for result in results:
+        expected = (WebSocketDisconnect, websockets.ConnectionClosed, asyncio.CancelledError)
+        if isinstance(result, BaseException) and not isinstance(result, expected):
+            raise result
+
+
+async def _to_worker(socket: WebSocket, upstream: ClientConnection) -> None:
+    while True:
+        message = await socket.receive()
+        if message["type"] == "websocket.disconnect":
+            return
+        await upstream.send(message.get("bytes") or message.get("text") or b"")
+
+
+async def _to_browser(socket: WebSocket, upstream: ClientConnection) -> None:
+    async for message in upstream:
+        if isinstance(message, str):
+            await socket.send_text(message)
+        else:
+            await socket.send_bytes(message)
+    await socket.close(TRY_AGAIN)

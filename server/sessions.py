@@ -1,0 +1,315 @@
+"""Live sessions: who watches, what their parameters are, and what happens when a worker dies."""
+
+import asyncio
+import contextlib
+import logging
+import secrets
+from collections import deque
+from collections.abc import AsyncIterator
+from typing import Any
+
+import orjson
+
+from labs.catalog import Entry
+from labs.errors import LabError
+from labs.params import Params
+from server.messages import NewSession, Notice, SessionInfo
+from server.pipe import HELLO, STATUS
+from server.settings import Settings
+from server.supervisor import Supervisor, Worker, WorkerGone
+
+log = logging.getLogger("orclab.sessions")
+
+QUEUE = 64
+"""Messages a slow viewer may be behind: two seconds. Then it starts afresh."""
+CRASHES, CRASH_SECONDS = 3, 60.0
+
+
+class SessionsFull(LabError):
+    """The limit of live sessions is reached."""
+
+
+class NoSession(LabError):
+    """No session has this id (any more)."""
+
+
+class NotNow(LabError):
+    """The session's worker is being replaced."""
+
+
+class Viewer:
+    """One page that watches. Too slow, it loses old telemetry; nobody waits for it."""
+
+    def __init__(self) -> None:
+        self._queue: asyncio.Queue[bytes | None] = asyncio.Queue(QUEUE + 4)
+
+    def push(self, payload: bytes, afresh: list[bytes]) -> None:
+        """Queues a message. A viewer too far behind skips to `afresh` and this one."""
+        if self._queue.qsize() >= QUEUE:
+            while not self._queue.empty():
+                self._queue.get_nowait()
+            for message in afresh:
+                self._queue.put_nowait(message)
+        self._queue.put_nowait(payload)
+
+    def close(self) -> None:
+        """Ends the stream after what is queued."""
+        if self._queue.full():
+            self._queue.get_nowait()
+        self._queue.put_nowait(None)
+
+    async def messages(self) -> AsyncIterator[bytes]:
+        """What to send, until the session ends."""
+        while (payload := await self._queue.get()) is not None:
+            yield payload
+
+
+class Session:
+    """One user's lab."""
+
+    def __init__(self, entry: Entry, params: Params, new: NewSession) -> None:
+        self.id = secrets.token_urlsafe(18)
+        self.entry = entry
+        self.state = "starting"
+        self.worker: Worker | None = None
+        self.viewers: set[Viewer] = set()
+        # What a new worker needs to go on where the last one ended.
+        self._latest: dict[str, Any] = {
+            "params": params.model_dump(),
+            "seed": new.seed,
+            "view": new.view.model_dump(),
+            "running": True,
+            "speed": 1.0,
+        }
+        self._kept: dict[int, bytes] = {}
+        self._crashes: deque[float] = deque(maxlen=CRASHES)
+        now = asyncio.get_running_loop().time()
+        self.watched = self.touched = now
+        """When somebody last watched, and last did something [s, loop's clock]."""
+
+    def info(self) -> SessionInfo:
+        return SessionInfo.model_validate(
+            {
+                "id": self.id,
+                "lab": self.entry.slug,
+                "params": self._latest["params"],
+                "seed": self._latest["seed"],
+                "state": self.state,
+                "scene": f"/scene/{self.id}/",
+                "stream": f"/api/sessions/{self.id}/stream",
+            }
+        )
+
+    async def open(self, supervisor: Supervisor) -> None:
+        """Takes a worker and sets it to work where the last one ended."""
+        worker = await supervisor.take()
+        worker.on_frame = self._on_frame
+        self.worker = worker
+        self.state = "live"
+        worker.tell("open", lab=self.entry.slug, **self._latest)
+        worker.tell("viewers", count=len(self.viewers))
+
+    async def change(self, changes: dict[str, Any]) -> dict[str, Any]:
+        """New parameters; answers all of them. Raises ParameterError, NotNow."""
+        self.entry.lab.Params().change(changes)
+        params: dict[str, Any] = await self.ask("params", changes=changes)
+        self._latest["params"] = params
+        return params
+
+    async def ask(self, do: str, **arguments: Any) -> Any:
+        """What the worker answers. Raises LabError, NotNow."""
+        self.touched = asyncio.get_running_loop().time()
+        try:
+            return await self._present().ask(do, **arguments)
+        except WorkerGone:
+            raise self._not_now() from None
+
+    async def write(self, form: str, path: str) -> None:
+        """Writes the recording to a file. Raises LabError, NotNow."""
+        try:
+            await self._present().ask_for_file(form, path)
+        except WorkerGone:
+            raise self._not_now() from None
+
+    def _present(self) -> Worker:
+        if self.worker is None or self.worker.gone:
+            raise self._not_now()
+        return self.worker
+
+    def _not_now(self) -> NotNow:
+        if self.state == "failed":
+            return NotNow("this session has ended after repeated crashes: open the lab anew")
+        return NotNow("the simulation is being restarted: try again in a moment")
+
+    # Viewers ------------------------------------------------------------------------------------
+
+    def join(self) -> Viewer:
+        """A page begins to watch."""
+        viewer = Viewer()
+        for payload in self._kept.values():
+            viewer.push(payload, [])
+        self.viewers.add(viewer)
+        self._count()
+        return viewer
+
+    def leave(self, viewer: Viewer) -> None:
+        """A page no longer watches."""
+        self.viewers.discard(viewer)
+        self.watched = asyncio.get_running_loop().time()
+        self._count()
+
+    def notify(self, state: str, text: str) -> None:
+        """Says something to every viewer."""
+        notice = Notice.model_validate({"state": state, "text": text})
+        self._broadcast(notice.model_dump_json().encode())
+
+    def _count(self) -> None:
+        with contextlib.suppress(WorkerGone):
+            if self.worker:
+                self.worker.tell("viewers", count=len(self.viewers))
+
+    def _broadcast(self, payload: bytes) -> None:
+        afresh = list(self._kept.values())
+        for viewer in self.viewers:
+            viewer.push(payload, afresh)
+
+    def _on_frame(self, kind: int, payload: bytes) -> None:
+        if kind in (HELLO, STATUS):
+            self._kept[kind] = payload
+        if kind == STATUS:
+            status = orjson.loads(payload)
+            for name in self._latest:
+                if name in ("params", "seed") and status[name] != self._latest[name]:
+                    self.touched = asyncio.get_running_loop().time()
+                self._latest[name] = status[name]
+        self._broadcast(payload)
+
+    def crashed(self) -> bool:
+        """Notes a crash; True when there were too many of late."""
+        now = asyncio.get_running_loop().time()
+        self._crashes.append(now)
+        return len(self._crashes) == CRASHES and now - self._crashes[0] < CRASH_SECONDS
+
+
+class Sessions:
+    """All sessions: bounded in number and in idle time."""
+
+    def __init__(self, settings: Settings, supervisor: Supervisor) -> None:
+        self._settings, self._supervisor = settings, supervisor
+        self._sessions: dict[str, Session] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def __len__(self) -> int:
+        return len(self._sessions)
+
+    def start(self) -> None:
+        self._do(self._reap())
+
+    async def stop(self) -> None:
+        for task in self._tasks:
+            task.cancel()
+        for session in tuple(self._sessions.values()):
+            self._forget(session, "ended", "The server stops.")
+
+    async def create(self, entry: Entry, new: NewSession) -> Session:
+        """A new session. Raises SessionsFull, ParameterError."""
+        params = entry.lab.Params().change(new.params)
+        if len(self) >= self._settings.max_sessions:
+            raise SessionsFull(
+                f"all {self._settings.max_sessions} places are taken: close another lab's page, "
+                "or wait until one falls idle"
+            )
+        session = Session(entry, params, new)
+        self._sessions[session.id] = session
+        try:
+            await session.open(self._supervisor)
+        except WorkerGone as error:
+            self._forget(session, "failed", str(error))
+            raise NotNow(f"the lab could not be opened ({error}): try again") from None
+        self._watch(session)
+        return session
+
+    def find(self, session_id: str) -> Session:
+        """Raises NoSession."""
+        try:
+            return self._sessions[session_id]
+        except KeyError:
+            raise NoSession(
+                "no session has this id: it ended, or the server was restarted; open the lab anew"
+            ) from None
+
+    async def delete(self, session_id: str) -> None:
+        """Ends a session. Raises NoSession."""
+        self._forget(self.find(session_id), "ended", "This session was closed.")
+
+    def _watch(self, session: Session) -> None:
+        worker = session.worker
+        assert worker is not None
+        worker.on_gone = lambda reason: self._do(self._recover(session, reason))
+        if worker.gone:
+            worker.on_gone(worker.gone)
+
+    async def _recover(self, session: Session, reason: str) -> None:
+        if session.id not in self._sessions:
+            return
+        session.worker = None
+        if session.crashed():
+            session.state = "failed"
+            session.notify(
+                "failed",
+                f"The simulation broke {CRASHES} times within a minute (last: {reason}). "
+                "Change the parameters or go back to the defaults, and open the lab anew.",
+            )
+            return
+        session.state = "recovering"
+        session.notify(
+            "recovering",
+            f"The simulation's process broke: {reason}. A new one starts with your parameters.",
+        )
+        try:
+            await session.open(self._supervisor)
+        except WorkerGone as error:
+            await self._recover(session, str(error))
+            return
+        if session.id not in self._sessions:
+            self._forget(session, "ended", "")
+            return
+        session.notify("live", f"The simulation was restarted with your parameters: {reason}.")
+        self._watch(session)
+
+    def _forget(self, session: Session, state: str, text: str) -> None:
+        self._sessions.pop(session.id, None)
+        session.notify(state, text)
+        for viewer in session.viewers:
+            viewer.close()
+        worker, session.worker = session.worker, None
+        if worker:
+            worker.on_gone = lambda reason: None
+            self._do(self._supervisor.release(worker, "its session ended"))
+
+    async def _reap(self) -> None:
+        settings = self._settings
+        while True:
+            await asyncio.sleep(min(1.0, settings.viewerless_seconds / 2))
+            now = asyncio.get_running_loop().time()
+            for session in tuple(self._sessions.values()):
+                if not session.viewers and now - session.watched > settings.viewerless_seconds:
+                    self._forget(session, "ended", "Nobody was watching.")
+                elif now - session.touched > settings.untouched_seconds:
+                    minutes = settings.untouched_seconds / 60
+                    self._forget(
+                        session,
+                        "ended",
+                        f"Nobody touched this lab for {minutes:.0f} minutes, so it made room for "
+                        "others. Reload the page to go on with the same parameters.",
+                    )
+
+    def _do(self, work: Any) -> None:
+        task = asyncio.ensure_future(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._done)
+
+    def _done(self, task: "asyncio.Task[None]") -> None:
+        self._tasks.discard(task)
+        if not task.cancelled() and (error := task.exception()):
+            log.error("a session's task failed", exc_info=error)

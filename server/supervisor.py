@@ -1,0 +1,247 @@
+"""Spawns workers, keeps a warm spare, hears their hearts, and kills those that fell silent."""
+
+import asyncio
+import contextlib
+import logging
+import multiprocessing
+import os
+import signal
+import socket
+from collections.abc import Callable
+from typing import Any
+
+import orjson
+
+from labs.errors import LabError
+from server import worker_entry
+from server.pipe import CONTROL, HEADER, encode, frame
+from server.settings import Settings
+
+log = logging.getLogger("orclab.supervisor")
+
+REQUEST_SECONDS = 10.0
+SPAWN_SECONDS = 60.0
+
+Frames = Callable[[int, bytes], None]
+Gone = Callable[[str], None]
+
+
+class WorkerGone(Exception):
+    """The worker ended before it answered."""
+
+
+class Worker:
+    """One worker process as the web process sees it."""
+
+    def __init__(self, process: Any, sock: socket.socket) -> None:
+        self.process = process
+        self.port = 0
+        """Of its Viser server, on loopback."""
+        self.on_frame: Frames = lambda kind, payload: None
+        self.on_gone: Gone = lambda reason: None
+        self.gone = ""
+        """Why it ended, in words; empty while it lives."""
+        self._socket = sock
+        self._answers: dict[int, asyncio.Future[Any]] = {}
+        self._references = 0
+        self._ready = asyncio.get_running_loop().create_future()
+        self._heard = asyncio.get_running_loop().time()
+
+    async def begin(self) -> None:
+        """Waits until the worker has said that it is ready."""
+        self._reader, self._writer = await asyncio.open_connection(sock=self._socket)
+        self._listening = asyncio.create_task(self._listen())
+        self.port = await asyncio.wait_for(self._ready, SPAWN_SECONDS)
+
+    def tell(self, do: str, **arguments: Any) -> None:
+        """Says what to do; expects no answer."""
+        self._send({"do": do, "with": arguments})
+
+    async def ask(self, do: str, **arguments: Any) -> Any:
+        """What the worker answers. Raises LabError if it refuses, WorkerGone if it is gone or
+        does not answer in time."""
+        return await self._answer(do, self._expect(), arguments)
+
+    async def ask_for_file(self, form: str, path: str) -> None:
+        """Waits until the worker has written its recording."""
+        done = self._expect()
+        await self.ask("export", form=form, path=path, done=done)
+        await self._await(done)
+
+    @property
+    def silence(self) -> float:
+        """[s] since the loop was last heard."""
+        return asyncio.get_running_loop().time() - self._heard
+
+    async def end(self, reason: str) -> None:
+        """Terminates, then kills."""
+        self._finish(reason)
+        with contextlib.suppress(ProcessLookupError):
+            self.process.terminate()
+            await asyncio.to_thread(self.process.join, 0.5)
+            self.process.kill()
+        await asyncio.to_thread(self.process.join, 5)
+
+    async def _answer(self, do: str, reference: int, arguments: dict[str, Any]) -> Any:
+        self._send({"do": do, "ref": reference, "with": arguments})
+        return await self._await(reference)
+
+    def _expect(self) -> int:
+        self._references += 1
+        self._answers[self._references] = asyncio.get_running_loop().create_future()
+        return self._references
+
+    async def _await(self, reference: int) -> Any:
+        try:
+            return await asyncio.wait_for(self._answers[reference], REQUEST_SECONDS)
+        except TimeoutError:
+            raise WorkerGone("the simulation does not answer") from None
+        finally:
+            self._answers.pop(reference, None)
+
+    def _send(self, message: dict[str, Any]) -> None:
+        if self.gone:
+            raise WorkerGone(self.gone)
+        self._writer.write(frame(CONTROL, encode(message)))
+
+    async def _listen(self) -> None:
+        try:
+            while True:
+                size, kind = HEADER.unpack(await self._reader.readexactly(HEADER.size))
+                payload = await self._reader.readexactly(size)
+                self._heard = asyncio.get_running_loop().time()
+                if kind == CONTROL:
+                    self._control(orjson.loads(payload))
+                else:
+                    self.on_frame(kind, payload)
+        except (asyncio.IncompleteReadError, OSError):
+            await asyncio.to_thread(self.process.join, 1)
+            self._finish(_obituary(self.process.exitcode))
+
+    def _control(self, message: dict[str, Any]) -> None:
+        if message.get("ready"):
+            self._ready.set_result(message["port"])
+        answer = self._answers.get(message.get("ref", 0))
+        if answer and not answer.done():
+            if message["error"]:
+                answer.set_exception(LabError(message["error"]))
+            else:
+                answer.set_result(message["answer"])
+
+    def _finish(self, reason: str) -> None:
+        if self.gone:
+            return
+        self.gone = reason
+        self._writer.close()
+        for answer in self._answers.values():
+            if not answer.done():
+                answer.set_exception(WorkerGone(reason))
+        if not self._ready.done():
+            self._ready.set_exception(WorkerGone(reason))
+        self.on_gone(reason)
+
+
+class Supervisor:
+    """All workers."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        # Inherited by the fork server: threads hurt at these sizes.
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+        self._context = multiprocessing.get_context("forkserver")
+        self._context.set_forkserver_preload(["server.preload"])
+        self._spares: list[Worker] = []
+        self._workers: set[Worker] = set()
+        self._tasks: set[asyncio.Task[Any]] = set()
+        self._filling = asyncio.Lock()
+
+    @property
+    def count(self) -> int:
+        """Workers alive, spares among them."""
+        return len(self._workers)
+
+    @property
+    def spares(self) -> int:
+        """Workers waiting for a session."""
+        return len(self._spares)
+
+    def start(self) -> None:
+        """Begins to watch, and warms the first spare."""
+        self._do(self._watch())
+        self._do(self._fill())
+
+    async def stop(self) -> None:
+        """Ends every worker."""
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*(w.end("the server stops") for w in tuple(self._workers)))
+
+    async def take(self) -> Worker:
+        """A worker for a session: the warm spare, or a new one."""
+        spare = next((w for w in self._spares if not w.gone), None)
+        if spare:
+            self._spares.remove(spare)
+        worker = spare or await self._spawn()
+        self._do(self._fill())
+        return worker
+
+    async def release(self, worker: Worker, reason: str) -> None:
+        """Ends a worker that is no longer needed."""
+        await worker.end(reason)
+        self._workers.discard(worker)
+
+    async def _spawn(self) -> Worker:
+        ours, theirs = socket.socketpair()
+        process = self._context.Process(
+            target=worker_entry.main, args=(theirs,), daemon=True, name="orclab-worker"
+        )
+        try:
+            await asyncio.to_thread(process.start)
+        except (EOFError, OSError) as error:
+            ours.close()
+            raise WorkerGone(f"no process could be started ({error!r})") from None
+        finally:
+            theirs.close()
+        worker = Worker(process, ours)
+        self._workers.add(worker)
+        try:
+            await worker.begin()
+        except (WorkerGone, TimeoutError) as error:
+            await self.release(worker, "it did not start")
+            raise WorkerGone(f"a worker did not start: {error}") from None
+        return worker
+
+    async def _fill(self) -> None:
+        async with self._filling:
+            self._spares = [w for w in self._spares if not w.gone]
+            while len(self._spares) < self._settings.spares:
+                self._spares.append(await self._spawn())
+
+    async def _watch(self) -> None:
+        while True:
+            await asyncio.sleep(0.25)
+            for worker in tuple(self._workers):
+                if worker.gone:
+                    self._workers.discard(worker)
+                    if worker in self._spares:
+                        self._do(self._fill())
+                elif worker.port and worker.silence > self._settings.hang_seconds:
+                    seconds = self._settings.hang_seconds
+                    reason = f"it stopped answering for {seconds:g} s and was ended"
+                    self._do(self.release(worker, reason))
+
+    def _do(self, work: Any) -> None:
+        task = asyncio.ensure_future(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._done)
+
+    def _done(self, task: asyncio.Task[Any]) -> None:
+        self._tasks.discard(task)
+        if not task.cancelled() and (error := task.exception()):
+            log.error("a supervisor's task failed", exc_info=error)
+
+
+def _obituary(exitcode: int | None) -> str:
+    if exitcode is not None and exitcode < 0:
+        return f"it was ended by {signal.Signals(-exitcode).name}"
+    return f"it ended unexpectedly (exit code {exitcode})"

@@ -1,0 +1,106 @@
+"""A small lab that uses every part of the contract: both clocks, every plot, every tunable."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from labs.lab import Action, Inputs, Lab, Measurement, Snapshot, State
+from labs.params import Params, choice, knob, toggle
+from labs.plots import Bars, Curve, HeatMap, Line, Matrix, Readout, TimeSeries
+from labs.scene import Scene
+
+
+class OscillatorParams(Params):
+    omega: float = knob(2.0, 0.1, 10.0, symbol=r"\omega", unit="rad/s", help="Frequency.")
+    gain: float = knob(10.0, 0.0, 1000.0, symbol="k_p", unit="1/s", help="Gain.", scale="log")
+    shape: str = choice("sine", {"sine": "Sine", "square": "Square"}, help="Form.", label="Shape")
+    noisy: bool = toggle(False, help="Adds noise.", label="Noise")
+    start: float = knob(
+        1.0, -1.0, 1.0, symbol="x_0", unit="m", help="Where it starts.", effect="restart"
+    )
+    guess: float = knob(
+        9.0, 1.0, 100.0, symbol="a", unit="", help="The root sought is of it.", effect="solve"
+    )
+
+
+@dataclass
+class OscillatorState(State):
+    x: float = 0.0
+    key: int = 0
+    kicks: int = 0
+    pulled: float = 0.0
+    root: float = 0.0
+
+
+class Oscillator(Lab[OscillatorParams, OscillatorState]):
+    title = "Oscillator"
+    section = "T.1"
+    summary = "A point swings, and a solver draws a root."
+    Params = OscillatorParams
+    plots = (
+        TimeSeries("Position", "m", (Line("x", "x"), Line("both", "y", "dash")), select="part"),
+        Curve("Phase", "angle", "wave", "angle [rad]", "wave"),
+        HeatMap("Field", "angle", "angle", "field", "a [rad]", "b [rad]", "value"),
+        Matrix("Matrix", "matrix", "M"),
+        Bars("Bars", "bars", "b", "m", "limits"),
+        Readout("root", "Root", ""),
+        Readout("late", "Late", "s"),
+    )
+    presets: Mapping[str, Mapping[str, float | str | bool]] = {"Fast": {"omega": 8.0}}
+    actions = (Action("kick", "Kick", "Kicks it."),)
+
+    def init(self, params: OscillatorParams, rng: np.random.Generator) -> OscillatorState:
+        return OscillatorState(x=params.start, key=int(rng.integers(2**32)))
+
+    def step(
+        self, params: OscillatorParams, inputs: Inputs, state: OscillatorState
+    ) -> OscillatorState:
+        t = state.t + self.period
+        wave = np.cos(params.omega * t)
+        x = float(np.sign(wave) if params.shape == "square" else wave) * params.start
+        if params.noisy:
+            x += float(np.random.default_rng([state.key, round(t / self.period)]).normal(0, 0.01))
+        pulled = inputs.handles.get("pull", (0.0, 0.0, 0.0))[0]
+        kicks = state.kicks + len(inputs.actions)
+        return replace(state, t=t, x=x, kicks=kicks, pulled=pulled)
+
+    def solve(self, params: OscillatorParams, state: OscillatorState) -> Iterator[Snapshot]:
+        root = params.guess
+        for iteration in range(1, 50):
+            root = 0.5 * (root + params.guess / root)
+            done = "converged" if abs(root * root - params.guess) < 1e-12 * params.guess else ""
+            yield Snapshot(iteration, {"root": root}, done)
+            if done:
+                return
+
+    def accept(
+        self, params: OscillatorParams, state: OscillatorState, snapshot: Snapshot
+    ) -> OscillatorState:
+        return replace(state, root=snapshot.data["root"])
+
+    def measure(self, params: OscillatorParams, state: OscillatorState) -> Measurement:
+        late = {"late": state.t} if state.t > 0.5 else {}
+        both = np.array([state.x, -state.x])
+        channels = {"x": state.x, "both": both, "root": state.root, "kicks": float(state.kicks)}
+        return {**channels, "pulled": state.pulled, **late}
+
+    def fields(self, params: OscillatorParams, state: OscillatorState) -> Mapping[str, np.ndarray]:
+        angle = np.linspace(0, 2 * np.pi, 40)
+        wave = np.sin(angle + state.t)
+        return {
+            "angle": angle,
+            "wave": wave,
+            "field": np.outer(wave, np.cos(angle)),
+            "matrix": np.array([[state.x, 1.0], [1.0, -state.x]]),
+            "bars": np.array([state.x, 0.5]),
+            "limits": np.array([1.0, 1.0]),
+        }
+
+    def draw(self, scene: Scene, params: OscillatorParams, state: OscillatorState) -> None:
+        scene.camera((2.0, -2.0, 1.5), (0.0, 0.0, 0.5))
+        scene.sphere("ball", (state.x, 0.0, 0.5), 0.1)
+        scene.handle("pull", (state.x, 0.0, 0.8))
+        scene.label("name", f"x = {state.x:.1f}", (state.x, 0.0, 1.0))
+        scene.arrow("arrow", (0.0, 0.0, 0.5), (state.x, 0.0, 0.5))
+        scene.trail("line", np.array([[-1.0, 0, 0], [1.0, 0, 0]]), "muted")

@@ -100,8 +100,9 @@ def linearised(
 
 def mass_matrix(model: pin.Model, data: pin.Data, q: np.ndarray) -> np.ndarray:
     """M(q), (nv, nv), both triangles [kg m^2]."""
-    upper: np.ndarray = np.triu(pin.crba(model, data, q))
-    return upper + np.triu(upper, 1).T
+    upper = np.triu(pin.crba(model, data, q))
+    mass: np.ndarray = upper + np.triu(upper, 1).T
+    return mass
 
 
 def _each(model: pin.Model, gains: Gains) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -13,6 +13,7 @@ Time is counted in units of 0.1 ms, as integers, so it never drifts.
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
@@ -85,9 +86,10 @@ def run(
     floor, minimum, maximum = -limit, np.minimum, np.maximum
     q_ref, v_ref, a_ref = reference
     torques = np.empty((len(due), len(q)))
-    for _ in range(due[0] if due else steps):
+    ends = (*due, steps)
+    for _ in range(ends[0]):
         q, v = integrate(acceleration, q, v, h)
-    for j, (start, end) in enumerate(zip(due, (*due[1:], steps), strict=True)):
+    for j, (start, end) in enumerate(pairwise(ends)):
         seen_q, seen_v = (q, v) if noise is None else (q + noise[j, 0], v + noise[j, 1])
         tau = law(seen_q, seen_v, z, q_ref[j], v_ref[j], a_ref[j])
         minimum(maximum(tau, floor), limit, out=held)

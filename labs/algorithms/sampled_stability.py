@@ -132,7 +132,7 @@ class LinearLoop:
         n = len(self.q)
         from_x = phi - gamma @ np.hstack([law.k_q, law.k_v])
         if not law.k_z.any():
-            return from_x
+            return np.asarray(from_x)
         to_z = np.hstack([-period * np.eye(n), np.zeros((n, n))])
         return np.block([[from_x, gamma @ law.k_z], [to_z, np.eye(n) * sampled]])
 

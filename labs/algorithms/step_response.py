@@ -26,7 +26,7 @@ class StepResponse:
     time: float
     """[s] when the step was."""
     error: np.ndarray
-    """e0, (nv,) [rad]."""
+    """e0, (nv,) [rad], read-only: the response keeps it from state to state."""
     size: float
     overshoot: float = 0.0
     """Share of the size."""
@@ -37,6 +37,8 @@ class StepResponse:
     def to(cls, time: float, error: np.ndarray) -> "StepResponse | None":
         """The response to a step that leaves this error; None when there is no step."""
         size = float(np.abs(error).max())
+        error = error.copy()
+        error.flags.writeable = False
         return cls(time, error, size) if size > SMALLEST else None
 
     def after(self, time: float, error: np.ndarray) -> "StepResponse":

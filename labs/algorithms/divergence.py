@@ -56,20 +56,25 @@ def _why(setting: Setting, diagnosis: Diagnosis) -> str:
             )
         case "period":
             return (
-                "The control period is at fault: continuous control would be stable, but with "
-                f"the torque held for {period} the error grows as exp({diagnosis.sampled:.3g} t)."
+                f"The control period is at fault: with continuous control the error would "
+                f"{_would_grow(diagnosis.continuous)}, but with the torque held for {period} it "
+                f"grows as exp({diagnosis.sampled:.3g} t)."
             )
         case "integrator":
             return (
                 f"The integrator and its step are at fault: {method} with {step} makes an error "
-                f"that {simulated}, where exact integration would give "
-                f"exp({diagnosis.sampled:.3g} t)."
+                f"that {simulated}; integrated exactly it would "
+                f"{_would_grow(diagnosis.sampled)}."
             )
         case _:
             return (
                 "Near the reference this loop is stable, so the motion was driven out of its "
                 "neighbourhood: by a large error, a force or torques at their limit."
             )
+
+
+def _would_grow(rate: float) -> str:
+    return f"grow as exp({rate:.3g} t)" if rate > GROWS else "not grow"
 
 
 def _sentence(advice: str) -> str:

@@ -585,7 +585,8 @@ def _force(
     def force(tip: np.ndarray) -> np.ndarray:
         pull: np.ndarray = SPRING * (target - tip)
         size = float(pull @ pull) ** 0.5
-        return push + pull * (STRONGEST_PULL / max(size, STRONGEST_PULL))
+        applied: np.ndarray = push + pull * (STRONGEST_PULL / max(size, STRONGEST_PULL))
+        return applied
 
     return force
 

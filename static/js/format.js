@@ -1,0 +1,26 @@
+// Numbers as people read them.
+
+const SUPERSCRIPTS = { "-": "⁻", 0: "⁰", 1: "¹", 2: "²", 3: "³", 4: "⁴", 5: "⁵", 6: "⁶", 7: "⁷", 8: "⁸", 9: "⁹" };
+
+// Four significant digits; very small and very large ones as powers of ten.
+export function number(value, digits = 4) {
+  if (value === null || value === undefined || !Number.isFinite(value)) return "—";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  if (size >= 1e5 || size < 1e-3) {
+    const [mantissa, exponent] = value.toExponential(Math.min(digits, 3) - 1).split("e");
+    const power = [...exponent.replace("+", "")].map((c) => SUPERSCRIPTS[c]).join("");
+    return `${minus(mantissa)}·10${power}`;
+  }
+  const decimals = Math.max(0, digits - 1 - Math.floor(Math.log10(size)));
+  return minus(value.toFixed(Math.min(decimals, 4)));
+}
+
+// As short as it goes without loss, for fields one types into.
+export function plain(value) {
+  return String(Number(Number(value).toPrecision(12)));
+}
+
+function minus(text) {
+  return text.replace("-", "−");
+}

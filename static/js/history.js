@@ -1,0 +1,83 @@
+// The samples of one run, column by column, bounded in memory.
+
+const CAPACITY = 24000; // rows
+const SECONDS = 120;
+
+export class History {
+  constructor(columns) {
+    this.columns = columns;
+    this.index = new Map(columns.map((name, i) => [name, i]));
+    // Twice the capacity: old rows are dropped by a rare copy, and a view never wraps around.
+    this.data = columns.map(() => new Float64Array(2048));
+    this.start = 0;
+    this.end = 0;
+  }
+
+  get length() {
+    return this.end - this.start;
+  }
+
+  get first() {
+    return this.length ? this.data[0][this.start] : 0;
+  }
+
+  get last() {
+    return this.length ? this.data[0][this.end - 1] : 0;
+  }
+
+  push(row) {
+    if (this.end === this.data[0].length) this.makeRoom();
+    for (let i = 0; i < this.data.length; i++) this.data[i][this.end] = row[i] ?? NaN;
+    this.end += 1;
+    if (this.length > CAPACITY) this.start += 1;
+    while (this.data[0][this.start] < this.last - SECONDS) this.start += 1;
+  }
+
+  // The samples of a channel's column as a view on memory, or null if there is none.
+  column(name) {
+    const i = this.index.get(name);
+    return i === undefined ? null : this.data[i].subarray(this.start, this.end);
+  }
+
+  // The index range, within `column`'s views, of times in [from, to], one beyond on each side.
+  span(from, to) {
+    const t = this.column("t");
+    return [Math.max(0, lower(t, from) - 1), Math.min(t.length, lower(t, to) + 1)];
+  }
+
+  latest(name) {
+    const i = this.index.get(name);
+    return i === undefined || !this.length ? null : this.data[i][this.end - 1];
+  }
+
+  // How many components a channel has: 0 for a scalar, null where there is no such channel.
+  components(channel) {
+    if (this.index.has(channel)) return 0;
+    let n = 0;
+    while (this.index.has(`${channel}[${n}]`)) n += 1;
+    return n || null;
+  }
+
+  makeRoom() {
+    const grow = this.length > this.data[0].length / 2;
+    this.data = this.data.map((old) => {
+      const fresh = grow ? new Float64Array(2 * old.length) : old;
+      fresh.set(old.subarray(this.start, this.end));
+      return fresh;
+    });
+    this.end -= this.start;
+    this.start = 0;
+  }
+}
+
+// The first index with t[i] >= value, in an ascending array.
+function lower(t, value) {
+  let a = 0;
+  let b = t.length;
+  while (a < b) {
+    const middle = (a + b) >> 1;
+    if (t[middle] < value) a = middle + 1;
+    else b = middle;
+  }
+  return a;
+}

@@ -1,0 +1,169 @@
+// The lab page: joins the session with everything that shows it or changes it.
+
+import { Experiments } from "./experiments.js";
+import { wireKeyboard } from "./keyboard.js";
+import { Knobs } from "./knobs.js";
+import { linkOf, readLink, writeLink } from "./link.js";
+import { wireMenus } from "./menus.js";
+import { Board } from "./plots/board.js";
+import { onViewChange, view, wirePreferences } from "./preferences.js";
+import { Session } from "./session.js";
+import { Stage } from "./stage.js";
+import { wireTips } from "./tips.js";
+import { toast } from "./toast.js";
+import { Transport } from "./transport.js";
+
+const lab = JSON.parse(document.getElementById("lab-data").textContent);
+const session = new Session(lab, document.getElementById("robot"), readLink(lab.params), view);
+const stage = new Stage();
+const board = new Board(lab);
+const transport = new Transport(send);
+const knobs = new Knobs(lab, (changes) => session.change(changes));
+const experiments = new Experiments(lab, apply, (text) => board.watch(text));
+let link = location.href;
+let fresh = null; // parameters an experiment or preset has just set
+
+// A command whose refusal is said at the bottom of the page. Tells whether it was done.
+async function send(command) {
+  try {
+    await session.send(command);
+    return true;
+  } catch (error) {
+    toast(error.message);
+    return false;
+  }
+}
+
+function apply(params) {
+  fresh = performance.now();
+  return send({ command: "apply", params, restart: true });
+}
+
+const actions = {
+  toggle: () => transport.toggle(),
+  step: () => send({ command: "step", count: 1 }),
+  reset: () => send({ command: "reset" }),
+  defaults: () => apply({}),
+  faster: () => transport.faster(1),
+  slower: () => transport.faster(-1),
+  clear: () => board.clear(),
+  share: () => copy(new URL(link, location.href).href, "Link copied: it opens this lab with these parameters."),
+  command: copyCommand,
+  full: () => fullScreen(),
+  help: () => document.getElementById("help").showModal(),
+  experiment: (i) => experiments.start(i),
+};
+
+async function copyCommand() {
+  const response = await fetch(`/api/sessions/${session.info?.id}/command`).catch(() => null);
+  const data = await response?.json().catch(() => null);
+  if (data?.command) copy(data.command, `Copied: ${data.command}`);
+  else toast(data?.error ?? "The server does not answer.");
+}
+
+async function copy(text, done) {
+  try {
+    await navigator.clipboard.writeText(text);
+    toast(done);
+  } catch {
+    // The clipboard needs a secure page; the text is then shown to be copied by hand.
+    toast(text, 30);
+  }
+}
+
+function fullScreen() {
+  if (document.fullscreenElement) document.exitFullscreen();
+  else document.getElementById("view").requestFullscreen?.();
+}
+
+function download(kind) {
+  if (!session.info) return;
+  const anchor = document.createElement("a");
+  anchor.href = `/api/sessions/${session.info.id}/export.${kind}`;
+  anchor.download = "";
+  anchor.click();
+}
+
+// What the session tells ----------------------------------------------------------------------
+
+session.addEventListener("phase", ({ detail: { phase, text } }) => {
+  const retry = { "Try now": () => session.create(session.news) };
+  const live = phase === "live";
+  transport.enable(live);
+  for (const button of document.querySelectorAll(".try")) button.disabled = !live;
+  if (["worker", "robot", "live"].includes(phase)) {
+    stage.progress(phase);
+    stage.say("");
+    if (live && text) toast(text);
+  } else {
+    stage.hold(true);
+    const buttons = phase === "lost" ? {} : phase === "ended" ? { Continue: () => session.hurry() } : retry;
+    stage.say(text, { warn: true, buttons });
+  }
+});
+
+session.addEventListener("refused", ({ detail }) => {
+  toast(`${detail} The lab starts with its defaults.`, 15);
+});
+
+session.addEventListener("hello", ({ detail }) => board.hello(detail));
+
+session.addEventListener("telemetry", ({ detail }) => {
+  board.telemetry(detail);
+  if (detail.rows.length) transport.showTime(detail.rows.at(-1)[0]);
+});
+
+session.addEventListener("status", ({ detail: status }) => {
+  transport.show(status);
+  if (!fresh && differs(knobs.values, status.params)) experiments.leave();
+  if (fresh && performance.now() - fresh > 1000) fresh = null;
+  knobs.show(status.params);
+  link = linkOf(lab.params, status.params, status.seed);
+  writeLink(link);
+  if (status.trouble) {
+    stage.say(status.trouble, { warn: true, buttons: { Reset: actions.reset, Defaults: actions.defaults } });
+  } else if (!recovering) {
+    stage.say("");
+  }
+});
+
+let recovering = false;
+session.addEventListener("notice", ({ detail: { state, text } }) => {
+  recovering = state === "recovering" || state === "failed";
+  if (state === "live") {
+    stage.say("");
+    if (text) toast(text);
+  } else {
+    const again = { "Start again": () => session.create("A new session goes on with your parameters.") };
+    stage.say(text, { warn: true, buttons: state === "recovering" ? {} : again });
+  }
+});
+
+function differs(known, params) {
+  return Object.entries(known).some(([name, value]) => params[name] !== value);
+}
+
+// What the reader does ------------------------------------------------------------------------
+
+for (const button of document.querySelectorAll("[data-do]")) {
+  button.addEventListener("click", () => actions[button.dataset.do]());
+}
+for (const button of document.querySelectorAll("[data-preset]")) {
+  button.addEventListener("click", () => apply(lab.presets[button.dataset.preset]));
+}
+for (const button of document.querySelectorAll("[data-export]")) {
+  button.addEventListener("click", () => download(button.dataset.export));
+}
+onViewChange((wanted) => {
+  board.retheme();
+  if (session.info) send({ command: "view", view: wanted });
+});
+document.getElementById("help").addEventListener("click", (event) => {
+  if (event.target === event.currentTarget) event.currentTarget.close();
+});
+
+wirePreferences();
+wireMenus();
+wireTips(lab, (name) => knobs.values[name] ?? lab.params.find((p) => p.name === name).default);
+wireKeyboard(actions);
+session.create();

@@ -1,0 +1,45 @@
+// One bar a component, and the limit each must stay within.
+
+import { card } from "./card.js";
+import { around, Chart } from "./chart.js";
+import { symbol } from "./symbol.js";
+
+export class Bars {
+  constructor(plot) {
+    this.plot = plot;
+    Object.assign(this, card(plot.title, plot.unit, "canvas tall"));
+    if (plot.mathml) this.legend.append(symbol(plot.mathml));
+    this.chart = new Chart(this.body, () => this.draw());
+  }
+
+  update(fields) {
+    if (!fields[this.plot.field]) return;
+    this.values = fields[this.plot.field].flat();
+    this.limits = fields[this.plot.limit]?.flat() ?? [];
+    this.draw();
+  }
+
+  draw() {
+    if (!this.values || !this.body.clientWidth) return;
+    const n = this.values.length;
+    const wanted = around([...this.values, ...this.limits, ...this.limits.map((v) => -v)], { zero: true });
+    const fits = this.y && this.y[0] <= wanted[0] && this.y[1] >= wanted[1];
+    if (!fits || this.y[1] - this.y[0] > 3 * (wanted[1] - wanted[0])) this.y = wanted;
+    const chart = this.chart;
+    chart.begin([0.4, n + 0.6], this.y, { xTicks: n > 30 ? null : this.values.map((_, i) => i + 1) });
+    this.values.forEach((value, i) => {
+      if (!Number.isFinite(value)) return;
+      const [a, b] = [chart.y(Math.max(0, value)), chart.y(Math.min(0, value))];
+      const left = chart.x(i + 0.7);
+      const full = Math.abs(value) >= 0.999 * this.limits[i];
+      chart.add("rect", { x: left, y: a, width: chart.x(i + 1.3) - left, height: Math.max(1, b - a), class: full ? "bar full" : "bar" });
+    });
+    this.limits.forEach((limit, i) => {
+      for (const edge of [limit, -limit]) chart.line([i + 0.6, edge], [i + 1.4, edge], "limit");
+    });
+  }
+
+  clear() {
+    this.y = null;
+  }
+}

@@ -1,0 +1,161 @@
+// All plots of a lab: keeps the samples of this run and the one before, and what they have in
+// common, the stretch of time shown and the component chosen.
+
+import { History } from "../history.js";
+import { Bars } from "./bars.js";
+import { element } from "./card.js";
+import { Curve } from "./curve.js";
+import { HeatMap } from "./heatmap.js";
+import { Matrix } from "./matrix.js";
+import { forgetColours } from "./palette.js";
+import { Readouts } from "./readouts.js";
+import { TimeSeries } from "./timeseries.js";
+
+const KINDS = { TimeSeries, Curve, Bars, Matrix, HeatMap };
+
+export class Board {
+  constructor(lab) {
+    this.lab = lab;
+    this.run = this.ghost = null;
+    this.number = null; // counts restarts, as the server does
+    this.window = 10;
+    this.zoomed = null;
+    this.selection = {};
+    this.readouts = new Readouts(lab.plots.filter((p) => p.kind === "Readout"), document.getElementById("tiles"));
+    this.plots = lab.plots.filter((p) => p.kind in KINDS).map((p) => new KINDS[p.kind](p, this));
+    document.getElementById("plots").append(...this.plots.map((plot) => plot.section));
+    this.series = this.plots.filter((plot) => plot instanceof TimeSeries);
+    this.pictured = this.plots.filter((plot) => plot.update);
+    this.unzoomButton = document.getElementById("unzoom");
+    this.unzoomButton?.addEventListener("click", () => this.unzoom());
+    const select = document.getElementById("window");
+    select?.addEventListener("change", () => {
+      this.window = Number(select.value);
+      this.unzoom();
+    });
+    if (select && !this.series.length) select.closest("label").hidden = true;
+  }
+
+  hello({ columns }) {
+    const same = this.run && columns.join() === this.run.columns.join();
+    if (same) return;
+    this.run = new History(columns);
+    this.ghost = null;
+    this.writeSelectors();
+    for (const plot of this.series) plot.rebuild();
+  }
+
+  telemetry({ run, rows, fields }) {
+    if (!this.run) return;
+    for (const row of rows) {
+      const restarted = run !== this.number || (this.run.length > 0 && row[0] < this.run.last);
+      if (restarted) this.begin(run);
+      if (!this.run.length || row[0] > this.run.last) this.run.push(row);
+    }
+    if (fields) for (const plot of this.pictured) plot.update(fields);
+    if (rows.length) this.refresh();
+  }
+
+  // Another run: what was drawn so far turns into the faint trace.
+  begin(number) {
+    this.number = number;
+    if (this.run.length > 1) this.ghost = this.run;
+    this.run = new History(this.run.columns);
+    this.zoomed = null;
+  }
+
+  clear() {
+    if (!this.run) return;
+    this.run = new History(this.run.columns);
+    this.ghost = null;
+    for (const plot of this.series) plot.span = null;
+    for (const plot of this.pictured) plot.clear();
+    this.unzoom();
+  }
+
+  // The stretch of time all time series show.
+  range() {
+    if (this.zoomed) return this.zoomed;
+    const { first, last } = this.run;
+    if (this.window) return [Math.max(0, last - this.window), Math.max(last, this.window)];
+    const end = Math.max(last, this.ghost?.last ?? 0);
+    return [Math.min(first, end - 1e-3), Math.max(end, first + 1)];
+  }
+
+  zoom(from, to) {
+    this.zoomed = [from, to];
+    this.refresh();
+  }
+
+  unzoom() {
+    this.zoomed = null;
+    this.refresh();
+  }
+
+  // Draws at the next frame, however often it is asked to.
+  refresh() {
+    if (this.unzoomButton) this.unzoomButton.hidden = !this.zoomed;
+    if (this.pending || !this.run) return;
+    this.pending = requestAnimationFrame(() => {
+      this.pending = 0;
+      for (const plot of this.series) plot.draw();
+      this.readouts.update(this.run);
+    });
+  }
+
+  retheme() {
+    forgetColours();
+    for (const plot of this.plots) plot.rebuild?.();
+  }
+
+  // Shows a reader where to look.
+  watch(text) {
+    for (const plot of this.plots) {
+      const wanted = text !== "" && plot.plot.title.toLowerCase().includes(text.toLowerCase());
+      plot.section.classList.toggle("watched", wanted);
+      if (wanted) plot.section.scrollIntoView({ block: "nearest", inline: "start", behavior: "smooth" });
+    }
+  }
+
+  // The component chosen for plots whose components share this name: an index, or "all".
+  selected(select) {
+    return select ? this.selection[select] ?? "all" : null;
+  }
+
+  writeSelectors() {
+    const host = document.getElementById("selectors");
+    if (!host) return;
+    const counts = {};
+    for (const { plot } of this.series) {
+      if (!plot.select) continue;
+      const n = Math.max(...plot.lines.map((line) => this.run.components(line.channel) ?? 0));
+      if (n > 1) counts[plot.select] = Math.max(counts[plot.select] ?? 0, n);
+    }
+    host.replaceChildren(...Object.entries(counts).map(([name, n]) => this.selector(name, n)));
+  }
+
+  selector(name, n) {
+    const field = element("fieldset", "segments");
+    field.append(element("legend", "", name));
+    if (this.selected(name) >= n) delete this.selection[name];
+    for (const value of [...Array(n).keys(), "all"]) {
+      const label = element("label");
+      const radio = element("input");
+      radio.type = "radio";
+      radio.name = `select-${name}`;
+      radio.checked = this.selected(name) === value;
+      radio.addEventListener("change", () => {
+        this.selection[name] = value;
+        for (const plot of this.series) {
+          if (plot.plot.select !== name) continue;
+          plot.span = null;
+          plot.hidden.clear();
+          plot.rebuild();
+        }
+      });
+      label.append(radio, element("span", "", value === "all" ? "all" : String(value + 1)));
+      field.append(label);
+    }
+    return field;
+  }
+}

@@ -1,0 +1,21 @@
+// The frame every plot stands in: a title with its unit, a place for a legend, and a body.
+
+export function card(title, unit = "", bodyClass = "canvas") {
+  const section = element("section", "plot");
+  const header = element("header");
+  const heading = element("h3", "", title);
+  if (unit) heading.append(" ", element("small", "", `[${unit}]`));
+  const legend = element("div", "legend");
+  header.append(heading, legend);
+  const body = element("div", bodyClass);
+  section.setAttribute("aria-label", title);
+  section.append(header, body);
+  return { section, heading, legend, body };
+}
+
+export function element(name, className = "", text = "") {
+  const made = document.createElement(name);
+  if (className) made.className = className;
+  if (text) made.textContent = text;
+  return made;
+}

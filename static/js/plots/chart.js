@@ -1,0 +1,101 @@
+// A small chart in SVG with round ticks, for curves and bars that change a few times a second.
+// Its colours come from the style sheet, so that a change of theme needs no redrawing.
+
+const SVG = "http://www.w3.org/2000/svg";
+
+export class Chart {
+  constructor(body, draw) {
+    this.body = body;
+    this.svg = svg("svg", { class: "chart", role: "img" });
+    body.append(this.svg);
+    new ResizeObserver(draw).observe(body);
+  }
+
+  // Clears, and draws axes for the ranges. `square` gives both axes the same scale.
+  begin([x0, x1], [y0, y1], { square = false, xTicks = null, xLabel = "", yLabel = "" } = {}) {
+    const { clientWidth: width, clientHeight: height } = this.body;
+    const em = 0.75 * parseFloat(getComputedStyle(document.documentElement).fontSize);
+    const left = 4.2 * em + (yLabel ? 1.6 * em : 0);
+    const bottom = 2 * em + (xLabel ? 1.4 * em : 0);
+    this.area = { left, top: 0.7 * em, width: Math.max(1, width - left - em), height: Math.max(1, height - bottom - 0.7 * em) };
+    if (square) {
+      const perPixel = Math.max((x1 - x0) / this.area.width, (y1 - y0) / this.area.height);
+      [x0, x1] = about((x0 + x1) / 2, perPixel * this.area.width);
+      [y0, y1] = about((y0 + y1) / 2, perPixel * this.area.height);
+    }
+    this.ranges = [x0, x1, y0, y1];
+    this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    this.svg.replaceChildren();
+    const { top } = this.area;
+    for (const v of ticks(y0, y1, this.area.height / (3 * em))) {
+      this.line([x0, v], [x1, v], v === 0 ? "zero" : "grid");
+      this.text(left - 0.5 * em, this.y(v) + 0.35 * em, label(v), "end");
+    }
+    for (const v of xTicks ?? ticks(x0, x1, this.area.width / (6 * em))) {
+      if (!xTicks) this.line([v, y0], [v, y1], v === 0 ? "zero" : "grid");
+      this.text(this.x(v), top + this.area.height + 1.5 * em, label(v), "middle");
+    }
+    if (xLabel) this.text(left + this.area.width / 2, height - 0.35 * em, xLabel, "middle");
+    if (yLabel) {
+      const [x, y] = [1.1 * em, top + this.area.height / 2];
+      this.text(x, y, yLabel, "middle").setAttribute("transform", `rotate(-90 ${x} ${y})`);
+    }
+  }
+
+  x(value) {
+    return this.area.left + ((value - this.ranges[0]) / (this.ranges[1] - this.ranges[0])) * this.area.width;
+  }
+
+  y(value) {
+    return this.area.top + (1 - (value - this.ranges[2]) / (this.ranges[3] - this.ranges[2])) * this.area.height;
+  }
+
+  line([x0, y0], [x1, y1], className) {
+    return this.add("line", { x1: this.x(x0), y1: this.y(y0), x2: this.x(x1), y2: this.y(y1), class: className });
+  }
+
+  text(x, y, content, anchor) {
+    const made = this.add("text", { x, y, "text-anchor": anchor });
+    made.textContent = content;
+    return made;
+  }
+
+  add(name, attributes) {
+    return this.svg.appendChild(svg(name, attributes));
+  }
+}
+
+// The range of finite values, a little wider, and never empty.
+export function around(values, { zero = false } = {}) {
+  const finite = values.filter(Number.isFinite);
+  let low = Math.min(...finite, ...(zero || !finite.length ? [0] : []));
+  let high = Math.max(...finite, ...(zero || !finite.length ? [0] : []));
+  if (high - low < 1e-9 * Math.max(1, Math.abs(high))) [low, high] = [low - 1, high + 1];
+  const margin = 0.08 * (high - low);
+  return [low - margin, high + margin];
+}
+
+function about(middle, width) {
+  return [middle - width / 2, middle + width / 2];
+}
+
+function ticks(low, high, most) {
+  const raw = (high - low) / Math.max(1, most);
+  const power = 10 ** Math.floor(Math.log10(raw));
+  const step = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= raw);
+  const found = [];
+  for (let k = Math.ceil(low / step); k * step <= high; k++) found.push(+(k * step).toPrecision(12));
+  return found;
+}
+
+function label(value) {
+  const size = Math.abs(value);
+  const text = size >= 1e5 || (size > 0 && size < 1e-4) ? value.toExponential(0) : String(value);
+  return text.replace("-", "−");
+}
+
+function svg(name, attributes) {
+  const made = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
+  return made;
+}

@@ -1,0 +1,74 @@
+// A field over a plane, on Plotly, which is large: it is loaded once such a plot comes into view.
+
+/* global Plotly */
+import { card } from "./card.js";
+import { colour } from "./palette.js";
+
+const EVERY = 250; // [ms] between redraws
+
+let loading = null;
+
+function load(address) {
+  loading ??= new Promise((resolve, reject) => {
+    const script = document.createElement("script");
+    script.src = address;
+    script.onload = resolve;
+    script.onerror = () => reject(new Error("The plotting library did not load."));
+    document.head.append(script);
+  });
+  return loading;
+}
+
+export class HeatMap {
+  constructor(plot, board) {
+    this.plot = plot;
+    Object.assign(this, card(plot.title, "", "canvas tall"));
+    this.drawnAt = 0;
+    new IntersectionObserver(async ([entry]) => {
+      this.visible = entry.isIntersecting;
+      if (!this.visible) return;
+      try {
+        await load(board.lab.vendor.plotly);
+        this.ready = true;
+        this.draw();
+      } catch (error) {
+        this.body.textContent = error.message;
+      }
+    }).observe(this.body);
+    new ResizeObserver(() => this.draw(true)).observe(this.body);
+  }
+
+  update(fields) {
+    const { x, y, z } = this.plot;
+    if (!fields[z]) return;
+    this.data = { x: fields[x], y: fields[y], z: fields[z] };
+    this.draw();
+  }
+
+  rebuild() {
+    this.draw(true);
+  }
+
+  draw(now = false) {
+    if (!this.ready || !this.visible || !this.data) return;
+    if (!now && performance.now() - this.drawnAt < EVERY) return;
+    this.drawnAt = performance.now();
+    const { x_label: xLabel, y_label: yLabel, z_label: zLabel } = this.plot;
+    const size = 0.75 * parseFloat(getComputedStyle(document.documentElement).fontSize);
+    const axis = (text) => ({ title: { text, standoff: 6 }, gridcolor: colour("grid"), zeroline: false, ticks: "" });
+    const trace = {
+      type: "heatmap", ...this.data, colorscale: "Viridis",
+      colorbar: { title: { text: zLabel }, thickness: 10, outlinewidth: 0 },
+    };
+    const layout = {
+      width: this.body.clientWidth, height: this.body.clientHeight,
+      margin: { l: 4.5 * size, r: size, t: 0.75 * size, b: 3.6 * size },
+      paper_bgcolor: "transparent", plot_bgcolor: "transparent",
+      font: { family: "system-ui, sans-serif", size, color: colour("axis") },
+      xaxis: axis(xLabel), yaxis: axis(yLabel), uirevision: "keep",
+    };
+    Plotly.react(this.body, [trace], layout, { displayModeBar: false, doubleClick: "reset" });
+  }
+
+  clear() {}
+}

@@ -1,0 +1,39 @@
+// Symbols as MathML, and a vector's component as its subscript: q becomes q₂, qʳᵉᶠ becomes q₂ʳᵉᶠ.
+
+const MATHML = "http://www.w3.org/1998/Math/MathML";
+
+export function symbol(mathml, component = null) {
+  const math = new DOMParser().parseFromString(mathml, "text/html").querySelector("math");
+  if (component === null) return math;
+  const number = make("mn", String(component + 1));
+  const only = math.childElementCount === 1 ? math.firstElementChild : null;
+  const kind = only?.localName;
+  if (kind === "msub" || kind === "msubsup") {
+    const old = only.children[1];
+    const both = make("mrow");
+    old.replaceWith(both);
+    both.append(old, make("mo", ","), number);
+  } else if (kind === "msup") {
+    const joined = make("msubsup");
+    const [base, above] = only.children;
+    joined.append(base, number, above);
+    only.replaceWith(joined);
+  } else {
+    const base = make("mrow");
+    base.append(...math.childNodes);
+    if (!only) {
+      base.prepend(make("mo", "("));
+      base.append(make("mo", ")"));
+    }
+    const indexed = make("msub");
+    indexed.append(base, number);
+    math.append(indexed);
+  }
+  return math;
+}
+
+function make(name, text = "") {
+  const element = document.createElementNS(MATHML, name);
+  element.textContent = text;
+  return element;
+}

@@ -1,0 +1,279 @@
+// Measured channels over time, on uPlot. Beneath them, faint, the same channels of the run before.
+
+/* global uPlot */
+import { number } from "../format.js";
+import { card, element } from "./card.js";
+import { colour, SERIES } from "./palette.js";
+import { symbol } from "./symbol.js";
+
+const DENSITY = 3; // samples a pixel that are worth drawing
+const READ_OUT_EVERY = 100; // [ms]
+
+export class TimeSeries {
+  constructor(plot, board) {
+    this.plot = plot;
+    this.board = board;
+    Object.assign(this, card(plot.title, plot.unit));
+    this.hidden = new Set(); // lines and components switched off in the legend
+    this.span = null; // the y range shown last
+    this.readAt = 0;
+    this.box = element("div", "reading-box");
+    this.box.hidden = true;
+    this.visible = true;
+    new IntersectionObserver(([entry]) => {
+      this.visible = entry.isIntersecting;
+      if (this.visible) this.draw();
+    }).observe(this.body);
+    new ResizeObserver(() => this.resize()).observe(this.body);
+  }
+
+  // One entry per curve: its column, line and component, by what the columns and selectors say.
+  choose() {
+    const chosen = this.board.selected(this.plot.select);
+    const curves = [];
+    this.components = 0;
+    this.plot.lines.forEach((line, l) => {
+      const n = this.board.run.components(line.channel);
+      if (n === null) return;
+      if (n === 0) return curves.push({ column: line.channel, line, l, c: null });
+      const all = [...Array(n).keys()];
+      const shown = chosen === "all" || chosen === null ? all : all.filter((c) => c === chosen);
+      if (line.style !== "limit") this.components = Math.max(this.components, shown.length);
+      for (const c of shown) curves.push({ column: `${line.channel}[${c}]`, line, l, c });
+    });
+    for (const curve of curves) {
+      const several = this.components > 1 && curve.c !== null;
+      const tone = `series-${((several ? curve.c : curve.l) % SERIES) + 1}`;
+      curve.tone = curve.line.style === "limit" ? "limit" : tone;
+    }
+    this.curves = curves;
+  }
+
+  // Builds the chart anew: for other columns, another selection or another theme.
+  rebuild() {
+    this.uplot?.destroy();
+    this.uplot = null;
+    this.choose();
+    if (!this.curves.length || !this.body.clientWidth) return;
+    const font = `${Math.round(0.75 * rem())}px system-ui, sans-serif`;
+    const axis = { stroke: colour("axis"), font, ticks: { show: false }, grid: { stroke: colour("grid"), width: 1 } };
+    const options = {
+      width: this.body.clientWidth,
+      height: this.body.clientHeight,
+      padding: [8, 10, 0, 0],
+      legend: { show: false },
+      cursor: {
+        sync: { key: "time", setSeries: false },
+        drag: { x: true, y: false, setScale: false },
+        points: { size: 6 },
+        y: false,
+        bind: { dblclick: () => () => this.board.unzoom() },
+      },
+      scales: {
+        x: { time: false, auto: false, range: (u, low, high) => [low, high] },
+        y: { range: (u, low, high) => this.range(low, high) },
+      },
+      axes: [
+        { ...axis, size: 1.75 * rem(), gap: 4, space: 4 * rem(), values: (u, ticks) => ticks.map((t) => `${+t.toFixed(6)} s`) },
+        { ...axis, size: 3.5 * rem(), gap: 6, space: 1.9 * rem(), values: (u, ticks) => ticks.map((v) => tick(v)) },
+      ],
+      series: [{}, ...this.curves.map((curve) => this.series(curve))],
+      hooks: {
+        drawAxes: [(u) => this.drawGhost(u)],
+        setSelect: [(u) => this.zoom(u)],
+        setCursor: [() => this.readOut(true)],
+      },
+    };
+    this.uplot = new uPlot(options, [[], ...this.curves.map(() => [])], this.body);
+    this.uplot.over.append(this.box);
+    this.writeLegend();
+    this.draw();
+  }
+
+  series({ line, tone, l, c }) {
+    const dash = { dash: [7, 5], limit: [3, 4] }[line.style];
+    const limit = line.style === "limit";
+    return {
+      stroke: colour(tone),
+      width: limit || dash ? 1.25 : 1.75,
+      dash,
+      auto: !limit, // a far limit must not flatten the curves
+      points: { show: false },
+      show: !this.hidden.has(`l${l}`) && !this.hidden.has(`c${c}`),
+    };
+  }
+
+  draw() {
+    const u = this.uplot;
+    if (!u || !this.visible) return;
+    const run = this.board.run;
+    const [from, to] = this.board.range();
+    const [a, b] = run.span(from, to);
+    const stride = Math.max(1, Math.floor((b - a) / (DENSITY * u.width)));
+    const data = ["t", ...this.curves.map((curve) => curve.column)].map((name) =>
+      thin(run.column(name), a, b, stride));
+    u.batch(() => {
+      u.setData(data, false);
+      u.setScale("x", { min: from, max: to });
+    });
+    this.readOut(false);
+  }
+
+  // The y range: the curves and the ghost, and a limit once a curve comes near it. It grows at
+  // once but shrinks only when much of it is empty, so that it does not tremble.
+  range(low, high) {
+    const [from, to] = this.board.range();
+    if (low === null || low === undefined) [low, high] = [Infinity, -Infinity];
+    for (const samples of this.ghostSamples(from, to)) {
+      for (const value of samples.y) {
+        if (value < low) low = value;
+        if (value > high) high = value;
+      }
+    }
+    if (!(low <= high)) return [-1, 1];
+    for (const curve of this.curves.filter((curve) => curve.line.style === "limit")) {
+      const limit = this.board.run.latest(curve.column);
+      if (limit > 0 && high > 0.6 * limit) high = Math.max(high, limit);
+      if (limit < 0 && low < 0.6 * limit) low = Math.min(low, limit);
+    }
+    const least = Math.max(1e-6, 1e-4 * Math.max(Math.abs(low), Math.abs(high)));
+    const middle = (low + high) / 2;
+    const half = Math.max((high - low) / 2, least);
+    const wanted = [middle - 1.08 * half, middle + 1.08 * half];
+    const [l, h] = this.span ?? wanted;
+    const fits = l <= low && h >= high && h - l < 1.6 * (wanted[1] - wanted[0]);
+    if (!fits) this.span = wanted;
+    return this.span ?? (this.span = wanted);
+  }
+
+  *ghostSamples(from, to) {
+    const ghost = this.board.ghost;
+    if (!ghost) return;
+    const [a, b] = ghost.span(from, to);
+    const stride = Math.max(1, Math.floor((b - a) / 600));
+    for (const curve of this.curves) {
+      if (curve.line.style === "limit" || this.hidden.has(`l${curve.l}`) || this.hidden.has(`c${curve.c}`)) continue;
+      const y = ghost.column(curve.column);
+      if (y) yield { curve, x: thin(ghost.column("t"), a, b, stride), y: thin(y, a, b, stride) };
+    }
+  }
+
+  drawGhost(u) {
+    const { ctx, bbox } = u;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    ctx.globalAlpha = 0.32;
+    ctx.lineWidth = 1.5 * devicePixelRatio;
+    const [from, to] = this.board.range();
+    for (const { curve, x, y } of this.ghostSamples(from, to)) {
+      ctx.strokeStyle = colour(curve.tone);
+      ctx.beginPath();
+      for (let i = 0; i < x.length; i++) ctx.lineTo(u.valToPos(x[i], "x", true), u.valToPos(y[i], "y", true));
+      ctx.stroke();
+    }
+    ctx.restore();
+  }
+
+  zoom(u) {
+    const { left, width } = u.select;
+    if (width < 4) return;
+    const [from, to] = [u.posToVal(left, "x"), u.posToVal(left + width, "x")];
+    u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
+    this.board.zoom(from, to);
+  }
+
+  // The legend: one entry a line with its value, or, of many components, lines and colours apart.
+  writeLegend() {
+    this.legend.replaceChildren();
+    this.values = [];
+    const several = this.components > 1;
+    const lines = new Map(this.curves.map((curve) => [curve.l, curve]));
+    for (const [l, { line, tone, c }] of lines) {
+      const button = this.switch(`l${l}`, line.style, several && line.style !== "limit" ? "axis" : tone);
+      button.append(symbol(line.mathml, several ? null : c));
+      if (!several) this.values.push([l, button.appendChild(element("output", "", "—"))]);
+    }
+    for (let c = 0; several && c < this.components; c++) {
+      this.switch(`c${c}`, "solid", `series-${(c % SERIES) + 1}`).append(String(c + 1));
+    }
+  }
+
+  switch(key, style, tone) {
+    const button = element("button", style);
+    button.type = "button";
+    button.style.setProperty("--tone", `var(--${tone})`);
+    button.setAttribute("aria-pressed", String(!this.hidden.has(key)));
+    button.title = "Show or hide";
+    button.addEventListener("click", () => {
+      if (!this.hidden.delete(key)) this.hidden.add(key);
+      this.span = null;
+      button.setAttribute("aria-pressed", String(!this.hidden.has(key)));
+      this.curves.forEach((curve, i) => {
+        const show = !this.hidden.has(`l${curve.l}`) && !this.hidden.has(`c${curve.c}`);
+        this.uplot.setSeries(i + 1, { show });
+      });
+      this.draw();
+    });
+    this.legend.append(button);
+    return button;
+  }
+
+  // Values at the cursor, or the latest ones.
+  readOut(now) {
+    const u = this.uplot;
+    if (!u || (!now && performance.now() - this.readAt < READ_OUT_EVERY)) return;
+    this.readAt = performance.now();
+    const { idx, left } = u.cursor;
+    const at = left >= 0 && idx !== null && idx !== undefined && u.data[0].length > 0 ? idx : null;
+    for (const [l, output] of this.values) {
+      const i = this.curves.findIndex((curve) => curve.l === l);
+      const samples = u.data[i + 1];
+      const text = number(samples[at ?? samples.length - 1]);
+      if (output.textContent !== text) output.textContent = text;
+    }
+    this.box.hidden = at === null;
+    if (at === null) return;
+    const rows = this.components > 1 ? this.curves.filter((_, i) => u.series[i + 1].show) : [];
+    this.box.replaceChildren(element("b", "", `t = ${u.data[0][at].toFixed(3)} s`));
+    // Only the plot one points at lists all its curves; the others tell the time alone.
+    if (u.over.matches(":hover")) {
+      for (const curve of rows.filter((curve) => curve.line.style !== "limit")) {
+        const entry = element("span");
+        entry.style.color = colour(curve.tone);
+        entry.append(symbol(curve.line.mathml, curve.c), ` ${number(u.data[this.curves.indexOf(curve) + 1][at])}`);
+        this.box.append(entry);
+      }
+    }
+    const right = left > u.over.clientWidth / 2;
+    this.box.style.insetInline = right ? "0.25rem auto" : "auto 0.25rem";
+  }
+
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.body;
+    if (!width) return;
+    if (this.uplot) this.uplot.setSize({ width, height });
+    else if (this.board.run) this.rebuild();
+  }
+}
+
+// Every stride-th sample of [a, b), and the last.
+function thin(samples, a, b, stride) {
+  if (stride === 1) return samples.subarray(a, b);
+  const first = a - (a % stride) + (a % stride ? stride : 0); // the same samples frame by frame
+  const kept = [];
+  for (let i = first; i < b; i += stride) kept.push(samples[i]);
+  if (b > a) kept.push(samples[b - 1]);
+  return kept;
+}
+
+function tick(value) {
+  return Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value) < 1e-3)
+    ? number(value, 2)
+    : String(+value.toFixed(6)).replace("-", "−");
+}
+
+function rem() {
+  return parseFloat(getComputedStyle(document.documentElement).fontSize);
+}

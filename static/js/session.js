@@ -1,0 +1,202 @@
+// One live session of a lab, from this page's side: creates it, listens to its stream, and brings
+// it back with the same parameters when the connection, the worker or the whole server was lost.
+//
+// Events: "phase" {phase, text}, "hello", "telemetry", "status", "notice", "refused" (a sentence).
+// Phases: worker, robot, live, lost, full, failed, ended.
+
+const BACKOFF = [500, 1000, 2000, 3500, 5000]; // [ms]
+const FULL_RETRY = 10000;
+const SILENCE = 8000; // A live stream speaks twice a second; after this it is taken for dead.
+
+export class Session extends EventTarget {
+  constructor(lab, frame, { params, seed }, view) {
+    super();
+    this.lab = lab;
+    this.frame = frame;
+    this.view = view; // a function: what the scene should look like now
+    this.want = { params, seed, speed: 1, running: null };
+    this.info = null;
+    this.socket = null;
+    this.tries = 0;
+    this.closed = false;
+    this.frame.addEventListener("load", () => {
+      this.sceneLoaded = this.info !== null;
+      this.settle();
+    });
+    addEventListener("online", () => this.hurry());
+    document.addEventListener("visibilitychange", () => this.hurry());
+    addEventListener("pagehide", () => this.leave());
+    addEventListener("pageshow", (event) => event.persisted && this.create());
+    setInterval(() => this.checkSilence(), 2000);
+  }
+
+  // Asks the server for a session. `news` is said once it lives.
+  async create(news = "") {
+    clearTimeout(this.timer);
+    this.closed = false;
+    this.info = null;
+    this.sceneLoaded = this.told = false;
+    this.restore = news !== "" || this.want.running !== null;
+    this.news = news;
+    this.tell("phase", { phase: "worker", text: news });
+    const { params, seed } = this.want;
+    const { status, data } = await request("POST", "/api/sessions", {
+      lab: this.lab.slug, params, seed, view: this.view(),
+    });
+    if (this.closed) return;
+    if (status === 201) return this.begin(data);
+    if (status === 503) {
+      this.tell("phase", { phase: "full", text: data.error });
+      this.timer = setTimeout(() => this.create(this.news), FULL_RETRY);
+    } else if (status === 0 || status >= 502) {
+      this.tell("phase", { phase: "lost", text: "The server does not answer. Trying again …" });
+      this.timer = setTimeout(() => this.create(this.news), this.delay());
+    } else if (status === 422 && Object.keys(params).length) {
+      this.want.params = {};
+      this.tell("refused", data.error);
+      this.create(news);
+    } else {
+      this.tell("phase", { phase: "failed", text: data.error });
+    }
+  }
+
+  begin(info) {
+    this.info = info;
+    this.tries = 0;
+    this.tell("phase", { phase: "robot", text: "" });
+    const address = `${info.scene}?hideViserLogo${this.view().dark ? "&darkMode" : ""}`;
+    // Replacing leaves no entry behind in the browser's history.
+    if (this.frame.src) this.frame.contentWindow.location.replace(address);
+    else this.frame.src = address;
+    this.listen();
+  }
+
+  listen() {
+    const socket = new WebSocket(location.origin.replace(/^http/, "ws") + this.info.stream);
+    this.socket = socket;
+    this.heard = performance.now();
+    socket.onmessage = (event) => {
+      if (socket !== this.socket) return;
+      this.heard = performance.now();
+      const message = JSON.parse(event.data);
+      if (message.type === "status") this.noteStatus(message);
+      this.tell(message.type, message);
+    };
+    socket.onclose = () => {
+      if (socket === this.socket) this.reconnect();
+    };
+  }
+
+  noteStatus(status) {
+    const { params, seed, speed } = status;
+    if (this.restore) {
+      // A session that takes over from a lost one goes on as that one did.
+      this.restore = false;
+      if (speed !== this.want.speed) this.send({ command: "speed", factor: this.want.speed });
+      if (this.want.running === false && status.running) this.send({ command: "pause" });
+      if (this.want.running && !status.running && !status.trouble) this.send({ command: "run" });
+    } else {
+      this.want = { params, seed, speed, running: status.running || status.trouble !== "" };
+    }
+    this.tries = 0;
+    this.told = true;
+    this.settle();
+  }
+
+  // Live once both the stream has spoken and the scene has loaded.
+  settle() {
+    if (!this.told || !this.sceneLoaded) return;
+    this.tell("phase", { phase: "live", text: this.news });
+    this.news = "";
+  }
+
+  async reconnect() {
+    clearTimeout(this.timer);
+    this.drop();
+    if (this.closed) return;
+    this.told = false;
+    this.tell("phase", { phase: "lost", text: "The connection was lost. Trying again …" });
+    const { status } = await request("GET", `/api/sessions/${this.info.id}`);
+    if (this.closed || this.socket) return;
+    if (status === 200 && this.tries < 1) {
+      this.tries += 1;
+      this.listen();
+    } else if (status === 404 && document.visibilityState === "visible") {
+      this.create("The session had ended. A new one goes on with your parameters.");
+    } else if (status === 404) {
+      this.ended = true; // nobody looks: no new session until somebody does
+      this.tell("phase", { phase: "ended", text: "The session has ended." });
+    } else {
+      this.timer = setTimeout(() => (status === 200 ? this.listen() : this.reconnect()), this.delay());
+    }
+  }
+
+  delay() {
+    return BACKOFF[Math.min(this.tries++, BACKOFF.length - 1)];
+  }
+
+  // Somebody looks again, or the network is back: no reason to wait.
+  hurry() {
+    if (document.visibilityState !== "visible" || this.closed || !this.info) return;
+    if (this.ended) {
+      this.ended = false;
+      this.create("The session had ended. A new one goes on with your parameters.");
+    } else if (!this.socket || performance.now() - this.heard > 3000) {
+      this.tries = 0;
+      this.reconnect();
+    }
+  }
+
+  checkSilence() {
+    if (this.socket && performance.now() - this.heard > SILENCE) this.reconnect();
+  }
+
+  drop() {
+    const socket = this.socket;
+    this.socket = null;
+    socket?.close();
+  }
+
+  leave() {
+    this.closed = true;
+    clearTimeout(this.timer);
+    this.drop();
+    if (this.info) fetch(`/api/sessions/${this.info.id}`, { method: "DELETE", keepalive: true });
+  }
+
+  // Commands and changes. Both throw an Error with the server's sentence.
+  send(command) {
+    return this.ask("POST", "commands", command);
+  }
+
+  change(changes) {
+    return this.ask("PATCH", "params", changes);
+  }
+
+  async ask(method, what, body) {
+    if (!this.info) throw new Error("The simulation is not ready yet.");
+    const { status, data } = await request(method, `/api/sessions/${this.info.id}/${what}`, body);
+    if (status >= 200 && status < 300) return data;
+    if (status === 404) this.hurry();
+    throw new Error(data.error);
+  }
+
+  tell(type, detail) {
+    this.dispatchEvent(new CustomEvent(type, { detail }));
+  }
+}
+
+// Status 0 stands for a server that could not be reached.
+async function request(method, address, body) {
+  try {
+    const response = await fetch(address, {
+      method,
+      headers: body === undefined ? {} : { "Content-Type": "application/json" },
+      body: body === undefined ? undefined : JSON.stringify(body),
+    });
+    const data = await response.json().catch(() => ({}));
+    return { status: response.status, data: { error: `The server answered ${response.status}.`, ...data } };
+  } catch {
+    return { status: 0, data: { error: "The server does not answer." } };
+  }
+}

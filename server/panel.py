@@ -33,7 +33,7 @@ class Panel:
                 for name, tunable in members:
                     self._show[name] = self._add(name, tunable, values[name])
                 for action in world.lab.actions:
-                    if action.group == group:
+                    if group and action.group == group:
                         self._button(action)
         for action in world.lab.actions:
             if not action.group:

@@ -63,6 +63,8 @@ class ViserScene:
         scene.configure_environment_map(
             "studio" if high else None, environment_intensity=0.25 if view.dark else 0.45
         )
+        # Without an environment map nothing lights what faces away from the lamps.
+        scene.add_light_ambient("/ambient", intensity=0.0 if high else 1.2)
         scene.add_grid(
             "/floor",
             infinite_grid=True,
@@ -272,7 +274,7 @@ class _ArmNode(_Node):
                 handle.color = COLORS["warning"] if level == 2 else AMBER
 
     def _ring(self, joint: int) -> Any:
-        axis = self._model.joints[joint].createData().S[3:, 0]
+        axis = np.reshape(self._model.joints[joint].createData().S, (6, -1))[3:, 0]
         vertices, faces = meshes.torus(0.095, 0.009)
         return self._scene.add_mesh_simple(
             f"{self._paths[joint]}/ring",

@@ -245,7 +245,7 @@ class Live:
             with self._guard():
                 self._telemetry(now)
             self._urgent = False
-        if self._beat("scene", now, FRAME):
+        if self._beat("scene", now, FRAME) and not self.failure:
             with self._guard():
                 self.scene.draw(self.world)
         if self._beat("status", now, STATUS_EVERY):
@@ -265,7 +265,8 @@ class Live:
         rows = self.world.recorder.since(self._sent_rows)
         self._sent_rows = self.world.recorder.count
         fields = None
-        if self.viewers and self._fields and self._beat("fields", now, FIELDS):
+        wanted = self.viewers and self._fields and not self.failure
+        if wanted and self._beat("fields", now, FIELDS):
             found = self.world.lab.fields(self.world.params, self.world.state)
             fields = {name: found[name] for name in self._fields if name in found}
         if self.viewers and (len(rows) or fields):

@@ -161,8 +161,5 @@ def _decades(knob: Knob) -> list[float]:
     """The ends, and the powers of ten between them that leave room for their digits."""
     top = math.floor(math.log10(knob.high) - 0.3)
     marks = [10.0**k for k in range(top, top - 12, -1)]
-    return [
-        knob.low,
-        *[m for m in marks if 0.15 < knob.position(max(m, knob.low)) < 0.9],
-        knob.high,
-    ]
+    inner = [m for m in marks if m > knob.low and 0.15 < knob.position(m) < 0.85]
+    return [knob.low, *inner, knob.high]

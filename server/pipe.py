@@ -8,6 +8,7 @@ import struct
 import threading
 from typing import Any
 
+import numpy as np
 import orjson
 
 HEADER = struct.Struct(">IB")
@@ -22,7 +23,14 @@ def frame(kind: int, payload: bytes) -> bytes:
 
 def encode(message: Any) -> bytes:
     """JSON; arrays become lists, NaN becomes null."""
-    return orjson.dumps(message, option=orjson.OPT_SERIALIZE_NUMPY | orjson.OPT_NON_STR_KEYS)
+    return orjson.dumps(message, default=_strided, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def _strided(value: object) -> object:
+    """Arrays that are views with strides come here; nothing else that is no JSON may pass."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} has no place in a message")
 
 
 class Link:

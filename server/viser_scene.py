@@ -28,6 +28,8 @@ COLORS: dict[Color, tuple[int, int, int]] = {
 }
 AMBER = (245, 166, 35)
 GHOST_OPACITY = 0.3
+GHOST_SCALE = 0.95
+"""A ghost is a little thinner: where the arm is on its reference, it hides the ghost."""
 STILL = 2e-5
 """A pose entry that moved less [m, or of a unit quaternion] is not sent again."""
 TRAIL_EVERY = 3
@@ -293,6 +295,9 @@ class _ArmNode(_Node):
             self._scene.add_glb(path, meshes.gltf(piece), **place)
             return
         vertices, faces = meshes.triangles(piece)
+        if ghost:
+            center = vertices.mean(axis=0)
+            vertices = center + GHOST_SCALE * (vertices - center)
         color = COLORS["reference"] if ghost else tuple(round(255 * c) for c in piece.color)
         self._scene.add_mesh_simple(
             path,

@@ -1,7 +1,5 @@
 // The controls of the simulation. What they show is what the server says, never what was wished.
 
-import { number } from "./format.js";
-
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4];
 const SNAP = 0.045; // in decades
 
@@ -29,6 +27,8 @@ export class Transport {
   }
 
   toggle() {
+    // After trouble the world waits for a reset; to run means to begin anew.
+    if (this.status?.trouble) return this.send({ command: "reset" }).then(() => this.send({ command: "run" }));
     return this.send({ command: this.status?.running ? "pause" : "run" });
   }
 
@@ -66,8 +66,9 @@ export class Transport {
     if (document.activeElement !== this.seed && before?.seed !== status.seed) this.seed.value = status.seed;
     if (this.solver) this.solver.textContent = status.solver;
     if (!this.run) return;
-    this.run.setAttribute("aria-pressed", String(status.running));
-    this.run.querySelector("span").textContent = status.running ? "Pause" : "Run";
+    const running = status.running && !status.trouble;
+    this.run.setAttribute("aria-pressed", String(running));
+    this.run.querySelector("span").textContent = running ? "Pause" : "Run";
     this.showTime(status.t);
     this.showPace(status);
     // A thumb in motion is not pulled back by what the server said a moment ago.
@@ -78,8 +79,9 @@ export class Transport {
     if (this.clock) this.clock.textContent = t.toFixed(2);
   }
 
-  showPace({ running, capped, real_time_factor: factor }) {
-    const text = !running ? "paused" : `${number(factor, 3)}× ${capped ? "capped" : "real time"}`;
+  showPace({ running, trouble, capped, real_time_factor: factor }) {
+    const moving = `${factor.toFixed(2)}× ${capped ? "capped" : "real time"}`;
+    const text = trouble ? "stopped" : running ? moving : "paused";
     if (this.pace.textContent !== text) this.pace.textContent = text;
     this.pace.classList.toggle("capped", running && capped);
     this.pace.title = capped

@@ -196,7 +196,7 @@ export class TimeSeries {
       if (!several) this.values.push([l, button.appendChild(element("output", "", "—"))]);
     }
     for (let c = 0; several && c < this.components; c++) {
-      this.switch(`c${c}`, "solid", `series-${(c % SERIES) + 1}`).append(String(c + 1));
+      this.switch(`c${c}`, "part", `series-${(c % SERIES) + 1}`).append(String(c + 1));
     }
   }
 

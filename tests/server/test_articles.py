@@ -1,0 +1,143 @@
+"""Articles render, and refuse what a page could not show or a lab could not run."""
+
+import dataclasses
+
+import pytest
+
+from labs.catalog import Entry, catalog
+from server.articles import Article, ArticleError, render, render_text, tex, words
+
+ENTRIES = list(catalog().values())
+EXPERIMENT = """```experiment
+title = "{title}"
+question = "What will $e$ do?"
+observe = "It **stays**."
+button = "Try <it>"
+{more}
+```
+"""
+
+
+@pytest.fixture
+def entry() -> Entry:
+    return catalog()["joint-control"]
+
+
+def write(entry: Entry, text: str) -> Article:
+    return render_text(entry, text)
+
+
+def experiment(more: str = "", title: str = "Sag") -> str:
+    return EXPERIMENT.format(title=title, more=more)
+
+
+@pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.slug)
+def test_every_article_renders(entry: Entry) -> None:
+    article = render(entry)
+    assert "<math" in article.html
+    assert article.experiments
+    assert "$$" not in article.html
+    assert article.html.count("data-experiment=") == len(article.experiments)
+
+
+def test_formulas_become_mathml(entry: Entry) -> None:
+    html = write(entry, "Inline $x^2$ and\n\n$$\\frac{a}{b}$$\n").html
+    assert "<math><msup>" in html
+    assert '<math display="block"><mfrac>' in html
+
+
+def test_bad_tex_names_the_article_and_the_formula(entry: Entry) -> None:
+    with pytest.raises(ArticleError, match=r"joint-control.*\\\\nonsense"):
+        write(entry, "Here $\\nonsense{x}$.")
+
+
+def test_bad_tex_inside_an_experiment_is_found_too(entry: Entry) -> None:
+    with pytest.raises(ArticleError, match="frac"):
+        write(entry, experiment().replace("$e$", "$\\\\frac{1$"))
+
+
+def test_html_is_text(entry: Entry) -> None:
+    html = write(entry, "<script>alert(1)</script> <b>bold</b>\n\n<img src=x>\n").html
+    assert "<script" not in html
+    assert "<b>" not in html
+    assert "<img" not in html
+    assert "&lt;script&gt;" in html
+
+
+def test_a_title_the_page_shows_itself_is_not_repeated(entry: Entry) -> None:
+    assert "<h1" not in write(entry, "# Joint control\n\nText.").html
+
+
+def test_tables_can_scroll(entry: Entry) -> None:
+    html = write(entry, "| a | b |\n|---|---|\n| 1 | 2 |\n").html
+    assert html.startswith('<div class="table"><table>')
+    assert "<td>1</td>" in html
+
+
+def test_other_fenced_blocks_stay_code(entry: Entry) -> None:
+    assert "<pre><code" in write(entry, "```python\nx < 1\n```\n").html
+
+
+def test_a_symbol_with_a_slider_names_it(entry: Entry) -> None:
+    html = write(entry, "The gain $k_p$.\n\n$$\\tau = k_p\\,e$$\n").html
+    assert '<a class="symbol" href="#param-kp" data-param="kp"><math>' in html
+    assert '<mrow class="symbol" data-param="kp"><msub><mi>k</mi><mi>p</mi></msub></mrow>' in html
+
+
+def test_an_experiment_is_read_and_shown(entry: Entry) -> None:
+    article = write(entry, experiment('watch = "error"\n[set]\nkp = 200.0\n'))
+    (found,) = article.experiments
+    assert (found.title, found.button, found.watch) == ("Sag", "Try <it>", "error")
+    assert dict(found.settings) == {"kp": 200.0}
+    assert "<math>" in found.question
+    assert "<strong>stays</strong>" in found.observe
+    assert "Try &lt;it&gt;" in article.html
+    assert found.observe in article.html
+
+
+def test_titles_are_escaped(entry: Entry) -> None:
+    assert "<i>" not in write(entry, experiment(title="<i>Sag</i>")).html
+
+
+@pytest.mark.parametrize(
+    ("more", "sentence"),
+    [
+        ("[set]\nnonsense = 1.0", "no parameter is named 'nonsense'"),
+        ("[set]\nkp = -1.0", "kp takes a number from"),
+        ("[set]\nkp = true", "kp takes a number from"),
+        ('[set]\ncontroller = "magic"', "controller takes one of"),
+        ('watch = "no such plot"', "no plot's title has 'no such plot'"),
+        ("wach = 1", "does not know wach"),
+        ("watch = 1", "watch has the wrong type"),
+        ("set = 1", "set has the wrong type"),
+        ("][", "not TOML"),
+    ],
+)
+def test_an_experiment_its_lab_cannot_run_is_refused(
+    entry: Entry, more: str, sentence: str
+) -> None:
+    with pytest.raises(ArticleError, match="joint-control") as caught:
+        write(entry, experiment(more))
+    assert sentence in str(caught.value)
+
+
+@pytest.mark.parametrize("key", ["title", "question", "observe", "button"])
+def test_an_experiment_needs_its_texts(entry: Entry, key: str) -> None:
+    text = "\n".join(line for line in experiment().split("\n") if not line.startswith(key))
+    with pytest.raises(ArticleError, match=f"lacks {key}"):
+        write(entry, text)
+
+
+def test_tex_renders_symbols() -> None:
+    assert tex("k_p") == "<math><msub><mi>k</mi><mi>p</mi></msub></math>"
+    assert 'display="block"' in tex("x", display=True)
+    with pytest.raises(ArticleError, match="frac"):
+        tex("\\frac{1")
+
+
+def test_words_are_distinct_and_without_formulas() -> None:
+    assert words("The arm, the ARM $\\alpha$ sags") == "arm sags the"
+
+
+def test_an_article_is_rendered_once(entry: Entry) -> None:
+    assert render(entry) is render(dataclasses.replace(entry))

@@ -10,9 +10,11 @@ from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
 from labs.catalog import catalog
+from server.articles import render
 from server.pages import STATIC, VENDOR, install, lab_data, vendor_url
 
 SLUGS = list(catalog())
+LAB = "joint-control"
 OWN_FILES = sorted(p for p in STATIC.rglob("*") if p.suffix in {".js", ".css", ".html", ".svg"})
 
 
@@ -35,7 +37,8 @@ def test_home_lists_every_lab_under_its_chapter(client: TestClient) -> None:
     html = client.get("/").text
     for slug, entry in catalog().items():
         assert f'href="/labs/{slug}"' in html
-        assert entry.lab.title in html and entry.chapter_title in html
+        assert entry.lab.title in html
+        assert entry.chapter_title in html
     assert html.count('class="chapter"') == len({e.chapter for e in catalog().values()})
 
 
@@ -43,7 +46,8 @@ def test_home_lists_every_lab_under_its_chapter(client: TestClient) -> None:
 def test_a_lab_page_reads_without_scripts(client: TestClient, slug: str) -> None:
     entry = catalog()[slug]
     html = client.get(f"/labs/{slug}").text
-    assert f"<h1>{entry.lab.title}</h1>" in html and "<math" in html
+    assert f"<h1>{entry.lab.title}</h1>" in html
+    assert render(entry).html in html
     for name, tunable in entry.lab.Params.tunables.items():
         assert f'id="param-{name}"' in html, name
         assert tunable.kind in {"knob", "choice", "toggle"}
@@ -54,7 +58,8 @@ def test_a_lab_page_carries_what_its_scripts_need(client: TestClient, slug: str)
     entry = catalog()[slug]
     data = page_data(client.get(f"/labs/{slug}").text)
     assert data == json.loads(json.dumps(lab_data(entry)))
-    assert data["slug"] == slug and data["period"] == entry.lab.period
+    assert data["slug"] == slug
+    assert data["period"] == entry.lab.period
     params = data["params"]
     assert isinstance(params, list)
     assert [p["name"] for p in params] == list(entry.lab.Params.tunables)
@@ -62,9 +67,10 @@ def test_a_lab_page_carries_what_its_scripts_need(client: TestClient, slug: str)
 
 
 def test_data_cannot_end_its_script_element(client: TestClient) -> None:
-    html = client.get(f"/labs/{SLUGS[0]}").text
+    html = client.get(f"/labs/{LAB}").text
     inside = html.split('id="lab-data">')[1].split("</script>")[0]
-    assert "<" not in inside and "\\u003cmath" in inside
+    assert "<" not in inside
+    assert "\\u003cmath" in inside
 
 
 @pytest.mark.parametrize("slug", ["nonsense", "<script>alert(1)</script>", "x" * 500])
@@ -75,22 +81,24 @@ def test_an_unknown_lab_gets_a_page_that_lists_those_there_are(
     if "/" in slug:  # never a page of ours
         assert answer.status_code == 404
         return
-    assert answer.status_code == 404 and "text/html" in answer.headers["content-type"]
+    assert answer.status_code == 404
+    assert "text/html" in answer.headers["content-type"]
     assert "no lab at this address" in answer.text
-    assert f'href="/labs/{SLUGS[0]}"' in answer.text
+    assert f'href="/labs/{LAB}"' in answer.text
 
 
 def test_what_an_address_says_is_escaped(client: TestClient) -> None:
     assert "<b>" not in client.get("/labs/<b>x").text
 
 
-@pytest.mark.parametrize("path", ["/", f"/labs/{SLUGS[0]}", "/labs/nonsense"])
+@pytest.mark.parametrize("path", ["/", f"/labs/{LAB}", "/labs/nonsense"])
 def test_pages_are_guarded(client: TestClient, path: str) -> None:
     headers = client.get(path).headers
     policy = headers["content-security-policy"]
     for rule in ("default-src 'self'", "script-src 'self'", "frame-ancestors 'self'"):
         assert rule in policy
-    assert "base-uri 'none'" in policy and "unsafe-eval" not in policy
+    assert "base-uri 'none'" in policy
+    assert "unsafe-eval" not in policy
     assert "ws://testserver" in policy
     assert headers["x-content-type-options"] == "nosniff"
     assert headers["referrer-policy"] == "same-origin"
@@ -102,7 +110,7 @@ def test_a_strange_host_does_not_reach_the_policy(client: TestClient) -> None:
 
 
 def test_pages_have_no_inline_scripts(client: TestClient) -> None:
-    for path in ("/", f"/labs/{SLUGS[0]}", "/labs/nonsense"):
+    for path in ("/", f"/labs/{LAB}", "/labs/nonsense"):
         html = client.get(path).text
         for attributes, content in re.findall(r"<script([^>]*)>(.*?)</script>", html, re.S):
             assert "src=" in attributes or "application/json" in attributes
@@ -111,12 +119,10 @@ def test_pages_have_no_inline_scripts(client: TestClient) -> None:
 
 
 def test_everything_a_page_refers_to_is_served(client: TestClient) -> None:
-    for path in ("/", f"/labs/{SLUGS[0]}", "/labs/nonsense"):
+    for path in ("/", f"/labs/{LAB}", "/labs/nonsense"):
         html = client.get(path).text
         links = re.findall(r"""(?:src|href)="(/[^"#]*)""", html)
         links += re.findall(r"""url\(["']?(/[^"')]+)""", html)
-            r'url\("?\'?(/[^"\')]+)', html
-        )
         assert links
         for link in set(links):
             assert client.get(link).status_code == 200, link
@@ -131,7 +137,8 @@ def test_modules_import_files_that_exist() -> None:
 @pytest.mark.parametrize("name", VENDOR)
 def test_files_from_wheels_are_served_for_long(client: TestClient, name: str) -> None:
     answer = client.get(vendor_url(name))
-    assert answer.status_code == 200 and len(answer.content) > 1000
+    assert answer.status_code == 200
+    assert len(answer.content) > 1000
     assert answer.headers["content-type"].startswith(VENDOR[name][3])
     assert "immutable" in answer.headers["cache-control"]
     assert re.search(r"\?v=\d", vendor_url(name))
@@ -148,7 +155,8 @@ def test_nothing_else_is_served(client: TestClient, path: str) -> None:
 
 def test_own_files_are_asked_for_again(client: TestClient) -> None:
     answer = client.get("/static/css/base.css")
-    assert answer.headers["cache-control"] == "no-cache" and answer.headers["etag"]
+    assert answer.headers["cache-control"] == "no-cache"
+    assert answer.headers["etag"]
 
 
 @pytest.mark.parametrize("path", OWN_FILES, ids=lambda p: str(p.relative_to(STATIC)))
@@ -159,7 +167,7 @@ def test_no_file_of_ours_reaches_out(path: Path) -> None:
     assert all(address.startswith("http://www.w3.org/") for address in found), found
 
 
-@pytest.mark.parametrize("path", ["/", f"/labs/{SLUGS[0]}"])
+@pytest.mark.parametrize("path", ["/", f"/labs/{LAB}"])
 def test_no_page_reaches_out(client: TestClient, path: str) -> None:
     assert not re.search(r'(?:src|href|action)="(?:https?:)?//', client.get(path).text)
 

@@ -60,7 +60,7 @@ export class TimeSeries {
     const options = {
       width: this.body.clientWidth,
       height: this.body.clientHeight,
-      padding: [8, 10, 0, 0],
+      padding: [8, 1.1 * rem(), 0, 0],
       legend: { show: false },
       cursor: {
         sync: { key: "time", setSeries: false },
@@ -116,7 +116,10 @@ export class TimeSeries {
       u.setData(data, false);
       u.setScale("x", { min: from, max: to });
     });
-    this.readOut(false);
+    // Under a resting pointer the samples move on.
+    const { left, top } = u.cursor;
+    if (left >= 0) u.setCursor({ left, top }, false);
+    this.readOut(left >= 0);
   }
 
   // The y range: the curves and the ghost, and a limit once a curve comes near it. It grows at
@@ -242,7 +245,9 @@ export class TimeSeries {
       for (const curve of rows.filter((curve) => curve.line.style !== "limit")) {
         const entry = element("span");
         entry.style.color = colour(curve.tone);
-        entry.append(symbol(curve.line.mathml, curve.c), ` ${number(u.data[this.curves.indexOf(curve) + 1][at])}`);
+        entry.style.gridColumn = curve.l + 1;
+        entry.append(symbol(curve.line.mathml, curve.c));
+        entry.append(element("output", "", number(u.data[this.curves.indexOf(curve) + 1][at], 3)));
         this.box.append(entry);
       }
     }

@@ -1,0 +1,249 @@
+"""Tunables and parameter sets (labs/params.py)."""
+
+import json
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from labs.errors import ParameterError
+from labs.params import LOG_SPAN, Knob, Params, Scale, choice, knob, toggle
+
+
+class Sample(Params):
+    kp: float = knob(100.0, 0.0, 2000.0, symbol="k_p", unit="N·m/rad", help="Gain.", scale="log")
+    decay: float = knob(0.1, 0.001, 10.0, symbol="a", unit="", help="Rate.", scale="log")
+    angle: float = knob(0.0, -3.0, 3.0, symbol="q", unit="rad", help="Angle.", label="angle")
+    law: str = choice("pid", {"pid": "PID", "pd": "PD"}, help="Law.", label="Law", effect="restart")
+    period: float = choice(0.001, {0.001: "1 ms", 0.01: "10 ms"}, help="T.", label="T", unit="s")
+    limits: bool = toggle(True, help="Cut.", label="Limits", effect="solve")
+
+
+def a_knob(low: float, high: float, scale: Scale) -> Knob:
+    return Knob("Help.", "k", "k", "", "live", "", low, high, 0.0, scale)
+
+
+@st.composite
+def knobs(draw: st.DrawFn) -> Knob:
+    scale = draw(st.sampled_from(["linear", "log", "log from zero"]))
+    high = draw(st.floats(1e-3, 1e6))
+    if scale == "linear":
+        return a_knob(high - draw(st.floats(1e-2, 1e3)), high, "linear")
+    return a_knob(high / draw(st.floats(1.5, 1e6)) if scale == "log" else 0.0, high, "log")
+
+
+# The slider -----------------------------------------------------------------------------------
+
+
+@given(knobs())
+def test_both_ends_of_a_slider_are_exact(k: Knob) -> None:
+    assert k.at(0.0) == k.low
+    assert k.at(1.0) == k.high
+    assert k.position(k.low) == pytest.approx(0.0, abs=1e-12)
+    assert k.position(k.high) == pytest.approx(1.0, rel=1e-12)
+
+
+@given(knobs(), st.floats(-1.0, 2.0), st.floats(-1.0, 2.0))
+def test_a_slider_is_monotone_and_stays_in_range(k: Knob, one: float, other: float) -> None:
+    low, high = sorted((one, other))
+    assert k.low <= k.at(low) <= k.at(high) <= k.high
+
+
+@given(knobs(), st.floats(0.0, 1.0))
+def test_position_inverts_at(k: Knob, position: float) -> None:
+    """As far as rounding to three significant digits allows: half a unit of the third digit."""
+    value = k.at(position)
+    if k.low < value < k.high:
+        shift = 0.0 if k.scale == "linear" else 0.00501 * abs(value)
+        slack = 1e-9 * (k.high - k.low)
+        exact = a_value(k, position)
+        assert abs(value - exact) <= shift + slack
+        assert k.position(exact) == pytest.approx(position, abs=1e-9)
+
+
+def a_value(k: Knob, position: float) -> float:
+    """The scales as their docstring defines them, without rounding."""
+    if k.scale == "linear":
+        return k.low + position * (k.high - k.low)
+    if k.low > 0:
+        return k.low * math.exp(position * math.log(k.high / k.low))
+    return float(k.high * (LOG_SPAN**position - 1.0) / (LOG_SPAN - 1.0))
+
+
+def test_a_logarithmic_slider_gives_each_decade_the_same_room() -> None:
+    k = a_knob(0.01, 100.0, "log")
+    assert [k.at(p) for p in (0.25, 0.5, 0.75)] == [0.1, 1.0, 10.0]
+
+
+def test_a_logarithmic_slider_from_zero_starts_linear_and_ends_logarithmic() -> None:
+    k = a_knob(0.0, 999.0, "log")
+    # value = r^s - 1 with r = 1000
+    assert k.at(1 / 3) == 9.0
+    assert k.at(2 / 3) == 99.0
+    assert k.position(0.0) == 0.0
+
+
+# Refusals -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("value", [-0.001, 2000.5, math.nan, math.inf, -math.inf, "100", None, []])
+def test_a_knob_refuses_with_its_range_and_unit(value: object) -> None:
+    with pytest.raises(ParameterError) as refused:
+        Sample().change({"kp": value})
+    assert str(refused.value) == f"kp = {value}: kp takes a number from 0 to 2000 N·m/rad"
+
+
+@pytest.mark.parametrize("value", [True, False])
+@pytest.mark.parametrize("name", ["kp", "period"])
+def test_a_bool_is_no_number(name: str, value: bool) -> None:
+    with pytest.raises(ParameterError, match=rf"{name} = {value}: {name} takes"):
+        Sample().change({name: value})
+
+
+@pytest.mark.parametrize("value", ["PID", "", 1.0, None, [], {}])
+def test_a_choice_refuses_with_its_options(value: object) -> None:
+    with pytest.raises(ParameterError) as refused:
+        Sample().change({"law": value})
+    assert str(refused.value) == f"law = {value}: law takes one of pid, pd"
+
+
+@pytest.mark.parametrize("value", [0.002, math.nan, math.inf, "0.001", None])
+def test_a_choice_of_numbers_refuses_what_lies_between(value: object) -> None:
+    with pytest.raises(ParameterError, match=r"period takes one of 0\.001, 0\.01"):
+        Sample().change({"period": value})
+
+
+@pytest.mark.parametrize("value", [0, 1, "true", 1.0, None])
+def test_a_toggle_takes_only_true_and_false(value: object) -> None:
+    with pytest.raises(ParameterError) as refused:
+        Sample().change({"limits": value})
+    assert str(refused.value) == f"limits = {value}: limits takes true or false"
+
+
+def test_an_unknown_name_is_refused_with_the_names_there_are() -> None:
+    with pytest.raises(ParameterError) as refused:
+        Sample().change({"kq": 1.0, "ka": 2.0})
+    assert str(refused.value) == (
+        "no parameter is named 'ka', 'kq'; there are kp, decay, angle, law, period, limits"
+    )
+
+
+def test_every_wrong_value_is_named_at_once() -> None:
+    with pytest.raises(ParameterError, match=r"kp takes a number .*; law takes|law = x: law takes"):
+        Sample().change({"kp": -1.0, "law": "x"})
+
+
+def test_a_huge_wrong_value_is_cut_short() -> None:
+    with pytest.raises(ParameterError) as refused:
+        Sample().change({"law": "x" * 100_000})
+    assert len(str(refused.value)) < 200
+
+
+# Sets -----------------------------------------------------------------------------------------
+
+
+def test_a_whole_number_is_a_number() -> None:
+    assert Sample().change({"kp": 500}).kp == 500.0
+
+
+def test_parameters_are_frozen() -> None:
+    with pytest.raises(ValidationError):
+        Sample().kp = 1.0  # type: ignore[misc]
+
+
+def test_a_change_makes_a_new_set_and_leaves_the_old() -> None:
+    old = Sample()
+    new = old.change({"kp": 1.0})
+    assert (old.kp, new.kp) == (100.0, 1.0)
+
+
+def test_a_change_changes_all_or_nothing() -> None:
+    params = Sample()
+    with pytest.raises(ParameterError):
+        params.change({"kp": 1.0, "law": "none"})
+    assert params == Sample()
+
+
+def test_differing_names_what_differs() -> None:
+    assert Sample().change({"kp": 5.0, "limits": False}).differing(Sample()) == {
+        "kp": 5.0,
+        "limits": False,
+    }
+    assert Sample().differing(Sample()) == {}
+
+
+def test_a_bare_field_is_refused_when_the_class_is_made() -> None:
+    with pytest.raises(TypeError, match="Bare: make other with knob, choice or toggle"):
+
+        class Bare(Params):
+            kp: float = knob(1.0, 0.0, 2.0, symbol="k", unit="", help="Gain.")
+            other: float = 1.0
+
+
+def test_a_default_out_of_range_is_refused() -> None:
+    class Wrong(Params):
+        kp: float = knob(3.0, 0.0, 2.0, symbol="k", unit="", help="Gain.")
+
+    with pytest.raises(ValidationError):
+        Wrong()
+
+
+def test_a_subclass_keeps_the_tunables_of_its_base() -> None:
+    class More(Sample):
+        mass: float = knob(1.0, 0.1, 2.0, symbol="m", unit="kg", help="Mass.")
+
+    assert list(More.tunables) == [*Sample.tunables, "mass"]
+
+
+# Text and JSON --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "value"),
+    [
+        ("kp", "500", 500.0),
+        ("kp", "5e2", 500.0),
+        ("law", "pd", "pd"),
+        ("period", "0.01", 0.01),
+        ("period", "1e-2", 0.01),
+        ("limits", "true", True),
+        ("limits", "False", False),
+        ("limits", "on", True),
+        ("limits", "0", False),
+    ],
+)
+def test_text_is_read_as_the_tunable_means_it(name: str, text: str, value: object) -> None:
+    read = Sample.read({name: text})
+    assert read == {name: value}
+    assert type(read[name]) is type(value)
+    assert getattr(Sample().change(read), name) == value
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [("kp", "much"), ("kp", "nan"), ("kp", ""), ("law", "7"), ("limits", "maybe"), ("nope", "1")],
+)
+def test_text_that_means_nothing_is_refused_by_change(name: str, text: str) -> None:
+    with pytest.raises(ParameterError, match=name):
+        Sample().change(Sample.read({name: text}))
+
+
+@given(st.floats(0.0, 2000.0))
+def test_a_number_survives_as_text(value: float) -> None:
+    assert Sample().change(Sample.read({"kp": str(value)})).kp == value
+
+
+def test_a_description_is_json_in_the_order_of_declaration() -> None:
+    described: list[dict[str, Any]] = json.loads(json.dumps(Sample.describe()))
+    assert [d["name"] for d in described] == ["kp", "decay", "angle", "law", "period", "limits"]
+    assert [d["kind"] for d in described] == ["knob"] * 3 + ["choice"] * 2 + ["toggle"]
+    kp, period = described[0], described[4]
+    assert (kp["default"], kp["low"], kp["high"], kp["scale"]) == (100.0, 0.0, 2000.0, "log")
+    assert (kp["symbol"], kp["label"], kp["unit"]) == ("k_p", "k_p", "N·m/rad")
+    assert period["options"] == [
+        {"value": 0.001, "label": "1 ms"},
+        {"value": 0.01, "label": "10 ms"},
+    ]

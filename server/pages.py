@@ -187,7 +187,7 @@ def _templates() -> Environment:
     )
     environment.globals.update(vendor=vendor_url, version=own_version(), words=words)
     environment.filters["tex"] = lambda source: Markup(tex(source))
-    environment.filters["number"] = lambda value: f"{value:.6g}"
+    environment.filters["number"] = lambda value: f"{value:.6g}".replace("-", "\u2212")
     return environment
 
 

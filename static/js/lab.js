@@ -1,6 +1,7 @@
 // The lab page: joins the session with everything that shows it or changes it.
 
 import { Experiments } from "./experiments.js";
+import { tidyFrame } from "./frame.js";
 import { wireKeyboard } from "./keyboard.js";
 import { Knobs } from "./knobs.js";
 import { linkOf, readLink, writeLink } from "./link.js";
@@ -103,7 +104,8 @@ session.addEventListener("phase", ({ detail: { phase, text } }) => {
 });
 
 session.addEventListener("refused", ({ detail }) => {
-  toast(`${detail} The lab starts with its defaults.`, 15);
+  const sentence = detail.replace(/\.?$/, ".");
+  toast(`The link was not taken: ${sentence} The lab starts with its defaults.`, 15);
 });
 
 session.addEventListener("hello", ({ detail }) => board.hello(detail));
@@ -162,6 +164,7 @@ document.getElementById("help").addEventListener("click", (event) => {
   if (event.target === event.currentTarget) event.currentTarget.close();
 });
 
+session.frame.addEventListener("load", () => tidyFrame(session.frame));
 wirePreferences();
 wireMenus();
 wireTips(lab, (name) => knobs.values[name] ?? lab.params.find((p) => p.name === name).default);

@@ -251,6 +251,7 @@ export class TimeSeries {
         this.box.append(entry);
       }
     }
+    this.box.style.gridTemplateColumns = `repeat(${rows.length ? this.plot.lines.length : 1}, auto)`;
     const right = left > u.over.clientWidth / 2;
     this.box.style.insetInline = right ? "0.25rem auto" : "auto 0.25rem";
   }

@@ -25,19 +25,22 @@ import numpy as np
 Acceleration = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """a(q, v): (nq,) [rad], (nv,) [rad/s] to (nv,) [rad/s^2]."""
 
-Step = Callable[[Acceleration, np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray]]
-"""(a, q, v, h) to (q+, v+), as new arrays; h [s]."""
+Duration = float | np.ndarray
+"""h [s]: a number, or that number nv times in an array, which NumPy multiplies faster."""
+
+Step = Callable[[Acceleration, np.ndarray, np.ndarray, Duration], tuple[np.ndarray, np.ndarray]]
+"""(a, q, v, h) to (q+, v+), as new arrays."""
 
 
 def explicit_euler(
-    a: Acceleration, q: np.ndarray, v: np.ndarray, h: float
+    a: Acceleration, q: np.ndarray, v: np.ndarray, h: Duration
 ) -> tuple[np.ndarray, np.ndarray]:
     """x+ = x + h f(x). Order 1, one evaluation (A.1.1)."""
     return q + h * v, v + h * a(q, v)
 
 
 def semi_implicit_euler(
-    a: Acceleration, q: np.ndarray, v: np.ndarray, h: float
+    a: Acceleration, q: np.ndarray, v: np.ndarray, h: Duration
 ) -> tuple[np.ndarray, np.ndarray]:
     """v+ = v + h a(q, v), q+ = q + h v+. Order 1, one evaluation; symplectic when a is the
     acceleration of a potential."""
@@ -46,14 +49,16 @@ def semi_implicit_euler(
 
 
 def midpoint(
-    a: Acceleration, q: np.ndarray, v: np.ndarray, h: float
+    a: Acceleration, q: np.ndarray, v: np.ndarray, h: Duration
 ) -> tuple[np.ndarray, np.ndarray]:
     """x+ = x + h f(x + h/2 f(x)). Order 2, two evaluations (A.1.2)."""
     v_mid = v + 0.5 * h * a(q, v)
     return q + h * v_mid, v + h * a(q + 0.5 * h * v, v_mid)
 
 
-def rk4(a: Acceleration, q: np.ndarray, v: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
+def rk4(
+    a: Acceleration, q: np.ndarray, v: np.ndarray, h: Duration
+) -> tuple[np.ndarray, np.ndarray]:
     """The classical Runge-Kutta method. Order 4, four evaluations (A.1.3)."""
     half = 0.5 * h
     a1 = a(q, v)

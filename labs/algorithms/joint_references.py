@@ -74,9 +74,8 @@ def motion(
     """q_ref [rad], v_ref [rad/s], a_ref [rad/s^2], each (m, nv), at phases (m,) [cycles] that
     advance at `rate` [1/s]."""
     s, ds, dds = PROFILES[name](phase, amplitude)
-    every_joint = np.ones_like(home)
-    return (
-        home + s[:, None],
-        np.multiply.outer(rate * ds, every_joint),
-        np.multiply.outer(rate**2 * dds, every_joint),
-    )
+    q_ref, v_ref, a_ref = np.empty((3, len(phase), len(home)))
+    np.add(home, s[:, None], out=q_ref)
+    v_ref[:] = (rate * ds)[:, None]
+    a_ref[:] = (rate**2 * dds)[:, None]
+    return q_ref, v_ref, a_ref

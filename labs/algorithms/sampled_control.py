@@ -81,7 +81,8 @@ def run(
     measured q and v. Returns q, v, z and the torques (m, nv) set at the ticks.
 
     A loop that diverges runs on to infinity or NaN; look at what comes back."""
-    law, limit, integrate, h = loop.law, loop.limit, loop.integrate, loop.h
+    law, limit, integrate = loop.law, loop.limit, loop.integrate
+    h = np.full(len(q), loop.h)
     acceleration, held, gain = loop.acceleration, loop.held, loop.integral_gain
     floor, minimum, maximum = -limit, np.minimum, np.maximum
     q_ref, v_ref, a_ref = reference

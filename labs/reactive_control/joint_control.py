@@ -3,13 +3,14 @@
 import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache, lru_cache
 from typing import ClassVar
 
 import numpy as np
 
 from labs.algorithms.divergence import Menu, explain
 from labs.algorithms.integrators import INTEGRATORS
-from labs.algorithms.joint_control import LAWS, Gains
+from labs.algorithms.joint_control import LAWS, Gains, Law
 from labs.algorithms.joint_references import cycles_per_second, motion
 from labs.algorithms.sampled_control import UNIT, Loop, run, ticks, time_between_ticks, units
 from labs.algorithms.sampled_stability import LinearLoop, Robot, Setting
@@ -517,11 +518,9 @@ class JointControl(Lab[JointParams, JointState]):
     def _loop(
         self, params: JointParams, world: Plant, force: Force | None, held: np.ndarray
     ) -> Loop:
-        known = plant(params.robot)
-        limit = known.arm.torque_limit
         return Loop(
-            law=LAWS[params.controller](known.model, known.data, params.gains),
-            limit=limit if params.torque_limits else np.full_like(limit, np.inf),
+            law=_law(params.controller, params.robot, params.gains),
+            limit=_limit(params.robot, params.torque_limits),
             acceleration=world.acceleration(held, params.friction, force),
             held=held,
             integrate=INTEGRATORS[params.integrator].step,
@@ -567,6 +566,19 @@ class JointControl(Lab[JointParams, JointState]):
             f"Diverged at t = {state.t:.2f} s: a joint passed {FASTEST:g} rad/s. {why}"
         )
         return stopped
+
+
+@lru_cache(maxsize=16)
+def _law(controller: str, robot: str, gains: Gains) -> Law:
+    known = plant(robot)
+    return LAWS[controller](known.model, known.data, gains)
+
+
+@cache
+def _limit(robot: str, limited: bool) -> np.ndarray:
+    """(nv,) [N m], infinite when the motors are not limited."""
+    limit = load(robot).torque_limit
+    return limit if limited else np.full_like(limit, np.inf)
 
 
 def _force(

@@ -26,7 +26,8 @@ def drifting_acceleration(robot: str, q: np.ndarray, v: np.ndarray) -> np.ndarra
     """J' v: the tip's acceleration when q'' = 0, by central differences of J."""
     world, d = plant(robot), 1e-6
     ahead, behind = world.tip_jacobian(q + d * v), world.tip_jacobian(q - d * v)
-    return (ahead - behind) @ v / (2 * d)
+    drift: np.ndarray = (ahead - behind) @ v / (2 * d)
+    return drift
 
 
 def test_a_payload_is_a_point_mass_at_the_tip(robot: str) -> None:
@@ -61,7 +62,12 @@ def test_a_force_sees_where_the_tip_is(robot: str) -> None:
     q, v, tau = at(robot)
     world = plant(robot)
     seen: list[np.ndarray] = []
-    world.acceleration(tau, 0.0, lambda tip: (seen.append(tip), FORCE)[1])(q, v)
+
+    def force(tip: np.ndarray) -> np.ndarray:
+        seen.append(tip)
+        return FORCE
+
+    world.acceleration(tau, 0.0, force)(q, v)
     np.testing.assert_array_equal(seen[0], world.tip(q))
 
 

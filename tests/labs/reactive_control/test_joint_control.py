@@ -3,7 +3,7 @@
 import copy
 import re
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from importlib.resources import files
 from itertools import pairwise
 from typing import Any
@@ -39,7 +39,7 @@ VERIFIED: set[str] = set()
 PUSHED = Inputs(actions=("push",))
 
 
-def experiment(title: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+def experiment(title: str) -> pytest.MarkDecorator:
     """Marks the test that verifies this experiment and gives it the experiment's settings."""
     VERIFIED.add(title)
     return pytest.mark.parametrize("setting", [EXPERIMENTS[title]], ids=[title])
@@ -70,7 +70,8 @@ def last(
 
 
 def error(state: JointState) -> np.ndarray:
-    return state.q_ref - state.q
+    e: np.ndarray = state.q_ref - state.q
+    return e
 
 
 def gravity(params: JointParams, q: np.ndarray) -> np.ndarray:
@@ -233,15 +234,25 @@ def test_it_starts_as_asked() -> None:
     np.testing.assert_array_equal(state.q_ref, home)
 
 
+def totals(params: JointParams) -> np.ndarray:
+    """The energy at every step of two seconds [J]."""
+    return np.array([LAB.measure(params, s)["total"] for s in states(params, 2.0)])
+
+
 def test_without_torque_energy_stays() -> None:
-    free = {"controller": "pid", "kp": 0.0, "kd": 0.0, "integrator": "rk4", "step": 0.0005}
+    free: dict[str, Value] = {
+        "controller": "pid",
+        "kp": 0.0,
+        "kd": 0.0,
+        "integrator": "rk4",
+        "step": 0.0005,
+    }
     for robot in ("ur5", "double-pendulum"):
         params = with_(free, robot=robot, payload=1.0)
-        energies = [LAB.measure(params, s)["total"] for s in states(params, 2.0)]
+        energies = totals(params)
         np.testing.assert_allclose(energies, energies[0], atol=1e-5)
         losing = with_(free, robot=robot, friction=0.5)
-        energies = [LAB.measure(losing, s)["total"] for s in states(losing, 2.0)]
-        assert np.all(np.diff(np.asarray(energies)) < 0.0)
+        assert np.all(np.diff(totals(losing)) < 0.0)
 
 
 @pytest.mark.parametrize("robot", ["ur5", "panda", "double-pendulum"])
@@ -294,7 +305,12 @@ def test_the_handle_pulls_like_a_spring() -> None:
 
 @pytest.mark.parametrize("robot", ["ur5", "panda", "double-pendulum"])
 def test_torque_stays_within_its_limits(robot: str) -> None:
-    setting = {"robot": robot, "kp": 2000.0, "reference": "set-point", "initial_error": 0.5}
+    setting: dict[str, Value] = {
+        "robot": robot,
+        "kp": 2000.0,
+        "reference": "set-point",
+        "initial_error": 0.5,
+    }
     limit = plant(robot).arm.torque_limit
     limited = list(states(with_(setting), 0.5))
     assert all(np.all(np.abs(s.torque) <= limit) for s in limited)

@@ -19,7 +19,7 @@ from labs.errors import LabError, UnknownLab
 from labs.params import Params
 from labs.record import versions
 from server import pages, proxy
-from server.guard import BodyTooLarge, Guard
+from server.guard import Guard
 from server.messages import (
     Apply,
     Changes,
@@ -41,6 +41,7 @@ SEND_SECONDS = 20.0
 """A viewer that takes this long for one message has left."""
 ENDED = 4404
 
+MEDIA = {"json": "application/json", "csv": "text/csv", "npz": "application/octet-stream"}
 STATUS_OF: dict[type[LabError], tuple[int, str]] = {
     UnknownLab: (404, "unknown-lab"),
     NoSession: (404, "no-session"),
@@ -95,7 +96,6 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_exception_handler(LabError, _refused)
     app.add_exception_handler(RequestValidationError, _not_valid)
     app.add_exception_handler(HTTPException, _http_error)
-    app.add_exception_handler(BodyTooLarge, _too_large)
     return app
 
 
@@ -181,7 +181,7 @@ async def command_line(request: Request, session_id: str) -> CommandLine:
 @api.get(
     "/sessions/{session_id}/export.{form}",
     response_class=FileResponse,
-    responses={200: {"content": {"application/octet-stream": {}}}},
+    responses={200: {"content": {media: {} for media in MEDIA.values()}}},
 )
 async def export(
     request: Request, session_id: str, form: Literal["json", "csv", "npz"]
@@ -197,6 +197,7 @@ async def export(
         raise
     return FileResponse(
         path,
+        media_type=MEDIA[form],
         filename=f"{session.entry.slug}.{form}",
         background=BackgroundTask(path.unlink),
     )
@@ -262,10 +263,6 @@ async def _http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     sentence = f"{request.method} {request.url.path[:200]}: {error.detail}"
     return _problem(error.status_code, sentence, "http", error.headers)
-
-
-async def _too_large(_: Request, error: Exception) -> Response:
-    return _problem(413, str(error), "too-large")
 
 
 def _problem(status: int, error: str, code: str, headers: Any = None) -> Response:

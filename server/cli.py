@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from pydantic import ValidationError
+
 from labs.catalog import catalog, find
 from labs.errors import LabError
 from labs.record import versions
@@ -69,7 +71,7 @@ def _parser() -> argparse.ArgumentParser:
 def _serving(parser: argparse.ArgumentParser) -> None:
     for flag, kind, help in (
         ("--host", str, "address to listen on (127.0.0.1)"),
-        ("--port", int, "port to listen on (8000; 0: any free one)"),
+        ("--port", _port, "port to listen on (8000; 0: any free one)"),
     ):
         parser.add_argument(flag, type=kind, default=argparse.SUPPRESS, help=help)
     parser.add_argument(
@@ -79,12 +81,16 @@ def _serving(parser: argparse.ArgumentParser) -> None:
 
 def _serve(options: argparse.Namespace) -> int:
     import uvicorn  # on demand: a headless run needs no web server
+    from pydantic_settings import SettingsError
 
     from server.app import create_app
     from server.settings import Settings
 
     given = {name: getattr(options, name) for name in ("host", "port") if name in options}
-    settings = Settings(**given)
+    try:
+        settings = Settings(**given)
+    except (ValidationError, SettingsError) as error:
+        raise LabError(_wrong_settings(error)) from None
     listener = _listen(settings.host, settings.port)
     host, port = listener.getsockname()[:2]
     shown = f"[{host}]" if ":" in host else host
@@ -120,6 +126,15 @@ def _serve(options: argparse.Namespace) -> int:
     return 0
 
 
+def _wrong_settings(error: Exception) -> str:
+    if not isinstance(error, ValidationError):
+        return f"ORCLAB_ORIGINS takes a JSON list of addresses ({error})"
+    return "; ".join(
+        f"ORCLAB_{str(e['loc'][0]).upper()} = {str(e['input'])[:80]}: {e['msg']}"
+        for e in error.errors()
+    )
+
+
 def _listen(host: str, port: int) -> socket.socket:
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listener = socket.socket(family, socket.SOCK_STREAM)
@@ -147,12 +162,15 @@ def _run(options: argparse.Namespace) -> int:
         raise LabError(f"--out {options.out}: the file is named F.json, F.csv or F.npz")
     if options.out and not options.out.parent.is_dir():
         raise LabError(f"--out {options.out}: there is no folder {options.out.parent}")
-    plan = _replayed(options.replay) if options.replay else _planned(options)
+    plan = _replayed(options) if options.replay else _planned(options)
     if options.seconds is not None:
         plan["seconds"] = options.seconds
     world = run(**plan, progress=_progress if sys.stderr.isatty() else None)
     if options.out:
-        options.out.write_bytes(world.recording().write(form))
+        try:
+            options.out.write_bytes(world.recording().write(form))
+        except OSError as error:
+            raise LabError(f"--out {options.out}: {error.strerror}") from None
         print(f"wrote {options.out}", file=sys.stderr)
     if world.trouble:
         print(world.trouble, file=sys.stderr)
@@ -178,15 +196,18 @@ def _planned(options: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def _replayed(path: Path) -> dict[str, Any]:
+def _replayed(options: argparse.Namespace) -> dict[str, Any]:
+    path = options.replay
+    if options.lab or options.set or options.at or options.seed is not None:
+        raise LabError("--replay takes the lab, its parameters, changes and seed from the file")
     try:
         about = json.loads(path.read_bytes())
         events: list[Event] = events_of(about)
         return {
-            "slug": about["lab"],
-            "changes": about["params"],
-            "seed": about["seed"],
-            "seconds": about["covers"]["to"],
+            "slug": str(about["lab"]),
+            "changes": dict(about["params"]),
+            "seed": _seed(int(about["seed"])),
+            "seconds": float(about["covers"]["to"]),
             "events": events,
         }
     except OSError as error:
@@ -195,9 +216,15 @@ def _replayed(path: Path) -> dict[str, Any]:
         raise LabError(f"--replay {path}: not a JSON export of orclab ({error!r})") from None
 
 
+def _port(text: str) -> int:
+    if not text.isdecimal() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"{text}: takes a whole number from 0 to 65535")
+    return int(text)
+
+
 def _seed(seed: int | None) -> int:
     if seed is not None and not 0 <= seed < 2**32:
-        raise LabError(f"--seed {seed}: takes a whole number from 0 to {2**32 - 1}")
+        raise LabError(f"seed {seed}: takes a whole number from 0 to {2**32 - 1}")
     return seed or 0
 
 

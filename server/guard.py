@@ -2,6 +2,7 @@
 
 from urllib.parse import urlsplit
 
+from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -47,15 +48,11 @@ class Guard:
             return 403, f"pages of {origin[:80]!r} may not use this server", "wrong-origin"
         length = headers.get("content-length", "0")
         if not length.isdigit() or int(length) > self._limit:
-            return 413, f"a request body may have {self._limit} bytes at most", "too-large"
+            return 413, _too_large(self._limit), "too-large"
         return None
 
     def _allowed(self, origin: str, host: str) -> bool:
         return origin in self._origins or urlsplit(origin).netloc == host
-
-
-class BodyTooLarge(Exception):
-    """A body without a declared length went past the limit."""
 
 
 def _bounded(receive: Receive, limit: int) -> Receive:
@@ -67,10 +64,14 @@ def _bounded(receive: Receive, limit: int) -> Receive:
         if message["type"] == "http.request":
             read += len(message.get("body", b""))
             if read > limit:
-                raise BodyTooLarge(f"a request body may have {limit} bytes at most")
+                raise HTTPException(413, _too_large(limit))
         return message
 
     return bounded
+
+
+def _too_large(limit: int) -> str:
+    return f"a request body may have {limit} bytes at most"
 
 
 def _hostname(host: str) -> str:

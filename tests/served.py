@@ -1,0 +1,134 @@
+"""A real orclab server for tests and measurements: started, spoken to, ended, or killed."""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import Any, Self
+
+import httpx
+import psutil
+from websockets.sync.client import ClientConnection, connect
+
+
+class Served:
+    """`with Served(ORCLAB_SPARES="0") as server: server.http.get("/")`."""
+
+    def __init__(self, port: int = 0, **environment: str) -> None:
+        self._environment = os.environ | {"ORCLAB_LABS": "tests.sample_labs"} | environment
+        self._port = port
+        self.start()
+
+    def start(self) -> None:
+        """Starts, and waits until it answers and a spare is warm."""
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "server", "--port", str(self._port)],
+            env=self._environment,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self.process.stdout is not None
+        line = self.process.stdout.readline()
+        assert "http://" in line, "the server did not start"
+        self.address = next(word for word in line.split() if "http" in word)
+        self._port = int(self.address.rsplit(":", 1)[1])
+        self.http = httpx.Client(base_url=self.address, timeout=60)
+        spares = int(self._environment.get("ORCLAB_SPARES", "1"))
+        until(lambda: self.health()["spares"] >= spares)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    def stop(self, how: signal.Signals = signal.SIGINT) -> None:
+        """Ends the server with a signal and waits."""
+        self.http.close()
+        if self.process.poll() is None:
+            self.process.send_signal(how)
+            self.process.wait(20)
+
+    def health(self) -> dict[str, Any]:
+        """What /healthz says."""
+        answer: dict[str, Any] = self.http.get("/healthz").json()
+        return answer
+
+    def workers(self) -> list[psutil.Process]:
+        """All processes below the server's, and theirs."""
+        return psutil.Process(self.process.pid).children(recursive=True)
+
+    def listeners(self) -> dict[int, tuple[str, int]]:
+        """Where each worker's Viser server listens, by process id."""
+        found = {}
+        for process in self.workers():
+            with contextlib.suppress(psutil.NoSuchProcess):  # one may just be ending
+                for connection in process.net_connections():
+                    if connection.status == "LISTEN":
+                        found[process.pid] = (connection.laddr.ip, connection.laddr.port)
+        return found
+
+    @contextlib.contextmanager
+    def session(self, lab: str, **more: Any) -> Iterator["Opened"]:
+        """A session that is closed at the end."""
+        opened = Opened(self, lab, more)
+        try:
+            yield opened
+        finally:
+            self.http.delete(opened.path)
+
+
+class Opened:
+    """A session seen through the API and its stream."""
+
+    def __init__(self, server: Served, lab: str, more: dict[str, Any]) -> None:
+        self.server = server
+        answer = server.http.post("/api/sessions", json={"lab": lab, **more})
+        assert answer.status_code == 201, answer.text
+        self.info: dict[str, Any] = answer.json()
+        self.path = f"/api/sessions/{self.info['id']}"
+
+    def set(self, **params: Any) -> httpx.Response:
+        return self.server.http.patch(f"{self.path}/params", json=params)
+
+    def command(self, command: str, **more: Any) -> httpx.Response:
+        body = {"command": command, **more}
+        return self.server.http.post(f"{self.path}/commands", json=body)
+
+    def export(self) -> dict[str, Any]:
+        answer: dict[str, Any] = self.server.http.get(f"{self.path}/export.json").json()
+        return answer
+
+    @contextlib.contextmanager
+    def stream(self, **options: Any) -> Iterator["Stream"]:
+        address = self.server.address.replace("http", "ws") + self.info["stream"]
+        with connect(address, **options) as socket:
+            yield Stream(socket)
+
+
+class Stream:
+    """A session's stream, read message by message."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self.socket = socket
+
+    def next(self, type: str, when: Callable[[dict[str, Any]], bool] = lambda m: True) -> Any:
+        """The next message of a type that fulfils a condition. Fails after 20 s."""
+        end = time.monotonic() + 20
+        while time.monotonic() < end:
+            message = json.loads(self.socket.recv(timeout=end - time.monotonic()))
+            if message["type"] == type and when(message):
+                return message
+        raise AssertionError(f"no such {type} came")
+
+
+def until(true: Callable[[], bool], seconds: float = 30.0) -> None:
+    """Waits until something is true. Fails after `seconds`."""
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "it did not come true in time"
+        time.sleep(0.02)

@@ -1,0 +1,226 @@
+"""The API against a real server: sessions, parameters, commands, exports, refusals."""
+
+import io
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from labs.run import Event, run
+from tests.served import Served, until
+
+
+def test_lists_labs_with_their_parameters(served: Served) -> None:
+    labs = {lab["slug"]: lab for lab in served.http.get("/api/labs").json()}
+    assert {"joint-control", "oscillator"} <= set(labs)
+    gain = next(p for p in labs["oscillator"]["params"] if p["name"] == "gain")
+    assert (gain["low"], gain["high"], gain["scale"], gain["unit"]) == (0, 1000, "log", "1/s")
+
+
+def test_a_session_lives_and_ends(served: Served) -> None:
+    before = served.health()["sessions"]
+    with served.session("oscillator", params={"omega": 3}, seed=4) as session:
+        found = served.http.get(session.path).json()
+        assert found["params"]["omega"] == 3
+        assert found["seed"] == 4
+        assert found["state"] == "live"
+        assert served.health()["sessions"] == before + 1
+    answer = served.http.get(session.path)
+    assert answer.status_code == 404
+    assert "open the lab anew" in answer.json()["error"]
+    until(lambda: served.health()["sessions"] == before)
+
+
+def test_changes_are_all_or_nothing(served: Served) -> None:
+    with served.session("oscillator") as session:
+        assert session.set(omega=5.0, noisy=True).json()["params"]["omega"] == 5.0
+        refused = session.set(omega=6.0, gain=-1.0)
+        assert refused.status_code == 422
+        assert refused.json()["error"] == "gain = -1.0: gain takes a number from 0 to 1000 1/s"
+        assert served.http.get(session.path).json()["params"]["omega"] == 5.0
+
+
+def test_commands_do_what_they_say(served: Served) -> None:
+    with served.session("oscillator") as session, session.stream() as stream:
+        stream.next("status", lambda s: s["running"] and s["t"] > 0)
+        assert session.command("pause").status_code == 204
+        paused = stream.next("status", lambda s: not s["running"])
+        session.command("step", count=7)
+        stepped = stream.next("status", lambda s: s["t"] > paused["t"])
+        assert stepped["t"] == pytest.approx(paused["t"] + 0.07, abs=1e-9)
+        session.command("reset")
+        assert stream.next("status", lambda s: s["run"] > paused["run"])["t"] == 0
+        session.command("speed", factor=4)
+        assert stream.next("status", lambda s: s["speed"] == 4)
+        session.command("seed", seed=9)
+        assert stream.next("status", lambda s: s["seed"] == 9)
+        session.command("apply", params={"omega": 7.0})
+        assert stream.next("status", lambda s: s["running"] and s["params"]["omega"] == 7.0)
+        session.command("apply")
+        assert stream.next("status", lambda s: s["params"]["omega"] == 2.0)
+        session.command("press", action="kick")
+        session.command("run")
+        stream.next("telemetry", lambda m: m["rows"] and m["rows"][-1][5] == 1.0)
+
+
+def test_a_restart_parameter_restarts(served: Served) -> None:
+    with served.session("oscillator") as session, session.stream() as stream:
+        first = stream.next("status", lambda s: s["t"] > 0.2)
+        session.set(start=-0.5)
+        after = stream.next("status", lambda s: s["run"] > first["run"])
+        assert after["t"] < first["t"]
+        assert after["params"]["start"] == -0.5
+
+
+def test_telemetry_has_every_step_once_and_in_order(served: Served) -> None:
+    with served.session("oscillator") as session, session.stream() as stream:
+        times: list[float] = []
+        while len(times) < 150:
+            times += [row[0] for row in stream.next("telemetry")["rows"]]
+        assert np.diff(times) == pytest.approx(np.full(len(times) - 1, 0.01), abs=1e-4)
+
+
+def test_fields_come_with_the_telemetry(served: Served) -> None:
+    with served.session("oscillator") as session, session.stream() as stream:
+        fields = stream.next("telemetry", lambda m: m["fields"] is not None)["fields"]
+        assert len(fields["field"]) == len(fields["angle"]) == 40
+        assert len(fields["matrix"]) == 2
+
+
+def test_exports_hold_the_same_run(served: Served) -> None:
+    with served.session("oscillator", params={"noisy": True}, seed=3) as session:
+        session.command("step", count=200)
+        session.set(omega=4.5)
+        session.command("step", count=50)
+        as_json = session.export()
+        as_csv = served.http.get(f"{session.path}/export.csv")
+        as_npz = served.http.get(f"{session.path}/export.npz")
+    assert "oscillator.csv" in as_csv.headers["content-disposition"]
+    x = np.array(as_json["channels"]["x"])
+    assert len(x) == as_json["covers"]["rows"] >= 251
+    comment, header, *lines = as_csv.text.splitlines()
+    assert json.loads(comment[2:])["params"] == as_json["params"]
+    column = header.split(",").index("x")
+    assert [float(line.split(",")[column]) for line in lines] == x.tolist()
+    arrays = np.load(io.BytesIO(as_npz.content))
+    assert arrays["x"].tolist() == x.tolist()
+    assert arrays["both"].shape == (len(x), 2)
+
+
+def replayed(about: dict[str, Any]) -> dict[str, np.ndarray]:
+    """The channels of the same run, made headless from an export."""
+    events = [Event(c["step"], c["kind"], c["name"], c["value"]) for c in about["changes"]]
+    world = run(
+        about["lab"],
+        about["params"],
+        seed=about["seed"],
+        seconds=about["covers"]["to"],
+        events=events,
+    )
+    return world.recorder.channels()
+
+
+@pytest.mark.parametrize("speed", [0.5, 4.0])
+def test_live_and_headless_are_the_same_bit_for_bit(served: Served, speed: float) -> None:
+    params = {"noise": 0.002, "initial_error": 0.1, "controller": "pid", "ki": 50.0}
+    with served.session("joint-control", params=params, seed=3) as session:
+        session.command("speed", factor=speed)
+        with session.stream() as stream:
+            stream.next("status", lambda s: s["t"] > 0.4)
+            session.set(kp=700.0, payload=2.0)
+            session.command("press", action="push")
+            stream.next("status", lambda s: s["t"] > 1.0)
+            session.set(integrator="rk4")
+            stream.next("status", lambda s: s["t"] > 1.4)
+        session.command("pause")
+        live = session.export()
+    headless = replayed(live)
+    assert live["changes"], "the changes were recorded"
+    assert set(live["channels"]) == set(headless)
+    for name, values in live["channels"].items():
+        assert np.array_equal(np.array(values, float), headless[name], equal_nan=True), (
+            f"{name} differs"
+        )
+
+
+def test_the_command_line_reproduces_what_was_done(served: Served) -> None:
+    with served.session("oscillator", seed=5) as session:
+        session.command("step", count=30)
+        session.set(omega=4.0)
+        session.command("step", count=20)
+        line = served.http.get(f"{session.path}/command").json()["command"]
+    assert line.startswith("orclab run oscillator --seed 5 --seconds ")
+    assert "omega=4.0" in line
+
+
+NOT_NUMBERS = ["NaN", "Infinity", "-Infinity", "1e999"]
+
+
+@pytest.mark.parametrize("text", NOT_NUMBERS)
+def test_numbers_must_be_finite(served: Served, text: str) -> None:
+    with served.session("oscillator") as session:
+        answer = served.http.patch(
+            f"{session.path}/params",
+            content=f'{{"omega": {text}}}',
+            headers={"content-type": "application/json"},
+        )
+        assert answer.status_code == 422, answer.text
+        assert answer.json()["error"]
+        assert math.isfinite(served.http.get(session.path).json()["params"]["omega"])
+
+
+@pytest.mark.parametrize(
+    ("body", "status"),
+    [
+        ("{", 422),
+        ("[]", 422),
+        ('"x"', 422),
+        ('{"lab": "no-such-lab"}', 404),
+        ('{"lab": "oscillator", "params": {"nothing": 1}}', 422),
+        ('{"lab": "oscillator", "params": {"omega": "fast"}}', 422),
+        ('{"lab": "oscillator", "params": {"omega": 1e6}}', 422),
+        ('{"lab": "oscillator", "seed": -1}', 422),
+        ('{"lab": "oscillator", "seed": 1.5}', 422),
+        ('{"lab": "oscillator", "surprise": 1}', 422),
+        ('{"lab": "../../etc/passwd"}', 404),
+    ],
+)
+def test_bad_sessions_are_refused_in_words(served: Served, body: str, status: int) -> None:
+    before = served.health()["sessions"]
+    answer = served.http.post(
+        "/api/sessions", content=body, headers={"content-type": "application/json"}
+    )
+    assert answer.status_code == status, answer.text
+    assert answer.json()["error"]
+    assert served.health()["sessions"] == before
+
+
+@pytest.mark.parametrize("command", ["fly", "speed", "step", "press", "apply"])
+def test_bad_commands_are_refused_in_words(served: Served, command: str) -> None:
+    bad = {"factor": 99, "count": -1, "action": "no-such", "params": {"omega": 99}}
+    with served.session("oscillator") as session:
+        wanted = {"speed": "factor", "step": "count", "press": "action", "apply": "params"}
+        name = wanted.get(command)
+        answer = session.command(command, **({name: bad[name]} if name else {}))
+        assert answer.status_code == 422
+        assert answer.json()["error"]
+
+
+def test_a_guessed_id_finds_nothing(served: Served) -> None:
+    for method, path in (
+        ("GET", "/api/sessions/guess"),
+        ("DELETE", "/api/sessions/guess"),
+        ("PATCH", "/api/sessions/guess/params"),
+        ("GET", "/api/sessions/guess/export.csv"),
+        ("GET", "/api/sessions/guess/command"),
+        ("GET", "/scene/guess/"),
+    ):
+        body = {"json": {}} if method == "PATCH" else {}
+        assert served.http.request(method, path, **body).status_code == 404, path
+
+
+def test_unknown_export_forms_are_refused(served: Served) -> None:
+    with served.session("oscillator") as session:
+        assert served.http.get(f"{session.path}/export.exe").status_code == 422

@@ -1,0 +1,153 @@
+"""What breaks, and what comes back by itself."""
+
+import os
+import signal
+
+import numpy as np
+import psutil
+import pytest
+
+from tests.served import Served, until
+
+
+def test_a_killed_worker_is_replaced_with_the_same_parameters(served: Served) -> None:
+    until(lambda: served.health()["spares"] == 1)
+    before = set(served.listeners())
+    params = {"omega": 6.5, "noisy": True}
+    with (
+        served.session("oscillator", params=params, seed=7) as session,
+        session.stream() as stream,
+    ):
+        stream.next("status", lambda s: s["t"] > 0.3)
+        # The session took the worker that was the spare.
+        (worker,) = before
+        os.kill(worker, signal.SIGKILL)
+        notice = stream.next("notice")
+        assert notice["state"] == "recovering"
+        assert "SIGKILL" in notice["text"]
+        assert stream.next("notice")["state"] == "live"
+        status = stream.next("status", lambda s: s["t"] > 0.1)
+        assert status["params"].items() >= params.items()
+        assert status["seed"] == 7
+        assert status["running"]
+        assert worker not in served.listeners()
+
+
+def test_a_killed_fork_server_takes_nothing_down() -> None:
+    with Served() as server, server.session("oscillator") as session, session.stream() as stream:
+        stream.next("status", lambda s: s["t"] > 0.3)
+        (fork_server,) = {psutil.Process(worker).ppid() for worker in server.listeners()}
+        os.kill(fork_server, signal.SIGKILL)
+        assert stream.next("notice")["state"] == "recovering"
+        assert stream.next("notice")["state"] == "live"
+        assert stream.next("status", lambda s: s["t"] > 0.1)
+
+
+def test_a_hung_lab_is_replaced_and_then_given_up(served: Served) -> None:
+    with served.session("troublesome") as session, session.stream() as stream:
+        stream.next("status", lambda s: s["t"] > 0.1)
+        session.set(fault="hang")
+        notice = stream.next("notice")
+        assert notice["state"] == "recovering"
+        assert "stopped answering for 3 s" in notice["text"]
+        # It hangs again with the same parameters, and is not restarted for ever.
+        last = stream.next("notice", lambda n: n["state"] == "failed")
+        assert "defaults" in last["text"]
+        assert session.set(fault="none").status_code == 503
+
+
+def test_trouble_stops_the_world_and_reset_starts_it(served: Served) -> None:
+    with served.session("troublesome") as session, session.stream() as stream:
+        session.set(fault="trouble")
+        stuck = stream.next("status", lambda s: s["trouble"])
+        assert stuck["trouble"].startswith("It diverged")
+        session.set(fault="none")
+        session.command("reset")
+        assert stream.next("status", lambda s: not s["trouble"] and s["t"] > 0.1)
+
+
+def test_a_lab_that_raises_says_so_and_lives_on(served: Served) -> None:
+    with served.session("troublesome") as session, session.stream() as stream:
+        session.set(fault="raise")
+        stuck = stream.next("status", lambda s: s["trouble"])
+        assert "ZeroDivisionError" in stuck["trouble"]
+        assert "defect of the lab" in stuck["trouble"]
+        session.set(fault="none")
+        session.command("reset")
+        assert stream.next("status", lambda s: not s["trouble"] and s["t"] > 0.1)
+
+
+def test_a_slow_lab_slows_time_down_and_says_so(served: Served) -> None:
+    slow = {"fault": "slow"}
+    with served.session("troublesome", params=slow) as session, session.stream() as stream:
+        status = stream.next("status", lambda s: s["capped"])
+        assert status["real_time_factor"] < 0.5
+
+
+def test_a_slow_reader_slows_nobody_and_grows_nothing(served: Served) -> None:
+    with (
+        served.session("joint-control") as session,
+        session.stream(max_queue=1) as lazy,
+        session.stream() as brisk,
+    ):
+        lazy.next("status")
+        web = psutil.Process(served.process.pid)
+        brisk.next("status", lambda s: s["t"] > 1)
+        memory = web.memory_info().rss
+        times = [row[0] for row in brisk.next("telemetry")["rows"]]
+        while times[-1] < times[0] + 6:
+            times += [row[0] for row in brisk.next("telemetry")["rows"]]
+        assert np.diff(times) == pytest.approx(np.full(len(times) - 1, 0.01), abs=1e-4)
+        assert web.memory_info().rss - memory < 10e6
+        # Reading again, the lazy one is told the present, not the past.
+        lazy.next("telemetry", lambda m: m["rows"] and m["rows"][-1][0] > times[-1] - 1)
+
+
+def test_the_session_limit_is_told_in_words() -> None:
+    with Served(ORCLAB_MAX_SESSIONS="1") as server, server.session("oscillator"):
+        answer = server.http.post("/api/sessions", json={"lab": "oscillator"})
+        assert answer.status_code == 503
+        assert answer.json()["code"] == "full"
+        assert "all 1 places are taken" in answer.json()["error"]
+
+
+def test_idle_sessions_end() -> None:
+    with Served(ORCLAB_VIEWERLESS_SECONDS="1", ORCLAB_UNTOUCHED_SECONDS="3") as server:
+        opened = server.http.post("/api/sessions", json={"lab": "oscillator"}).json()
+        until(lambda: server.http.get(f"/api/sessions/{opened['id']}").status_code == 404)
+        with server.session("oscillator") as session, session.stream() as stream:
+            notice = stream.next("notice")
+            assert notice["state"] == "ended"
+            assert "same parameters" in notice["text"]
+        until(lambda: server.health()["sessions"] == 0)
+
+
+def test_ended_sessions_leave_no_process(served: Served) -> None:
+    with served.session("oscillator"):
+        pass
+    until(lambda: served.health()["sessions"] == 0)
+    # The fork server, the resource tracker and the spare remain.
+    until(lambda: served.health()["workers"] == served.health()["spares"] == 1)
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_no_process_survives_the_server(how: signal.Signals) -> None:
+    server = Served()
+    answer = server.http.post("/api/sessions", json={"lab": "troublesome"}).json()
+    path = f"/api/sessions/{answer['id']}/params"
+    until(lambda: server.health()["workers"] == 2)
+    below = server.workers()
+    assert len(below) >= 3
+    # One of the workers is stuck in an endless loop when the server goes.
+    server.http.patch(path, json={"fault": "hang"})
+    os.kill(server.process.pid, how)
+    server.process.wait(20)
+    assert not psutil.wait_procs(below, timeout=10)[1], "these survived"
+
+
+def test_a_restarted_server_answers_404_for_the_old_session() -> None:
+    with Served() as server:
+        old = server.http.post("/api/sessions", json={"lab": "oscillator"}).json()
+        server.stop()
+        server.start()
+        assert server.http.get(f"/api/sessions/{old['id']}").status_code == 404

@@ -13,7 +13,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from labs.errors import UnknownLab
+from labs.errors import LabError, UnknownLab
 from labs.lab import Lab
 
 CHAPTERS = (
@@ -37,7 +37,8 @@ class Entry:
     @property
     def article(self) -> str:
         """The article's Markdown."""
-        return self._resource(".md").read_text(encoding="utf-8")
+        text: str = self._resource(".md").read_text(encoding="utf-8")
+        return text
 
     @property
     def picture(self) -> bytes | None:
@@ -51,13 +52,14 @@ class Entry:
 
 @cache
 def catalog() -> dict[str, Entry]:
-    """All labs by slug, in the order of the course."""
+    """All labs by slug, in the order of the course. Raises LabError for a wrong `ORCLAB_LABS`."""
     extra = [name for name in os.environ.get("ORCLAB_LABS", "").split(",") if name]
     entries = [entry for package in (*CHAPTERS, *extra) for entry in _labs_in(package)]
     found: dict[str, Entry] = {}
     for entry in entries:
         if entry.slug in found:
-            raise ValueError(f"two labs are named {entry.slug}: {found[entry.slug]}, {entry}")
+            both = f"{found[entry.slug].lab.__class__} and {entry.lab.__class__}"
+            raise LabError(f"two labs are named {entry.slug}: {both}")
         found[entry.slug] = entry
     return found
 
@@ -71,7 +73,7 @@ def find(slug: str) -> Entry:
 
 
 def _labs_in(package: str) -> list[Entry]:
-    chapter = importlib.import_module(package)
+    chapter = _chapter(package)
     entries = []
     for info in pkgutil.iter_modules(chapter.__path__):
         module = importlib.import_module(f"{package}.{info.name}")
@@ -83,4 +85,21 @@ def _labs_in(package: str) -> list[Entry]:
             ):
                 slug = info.name.replace("_", "-")
                 entries.append(Entry(slug, chapter.NUMBER, chapter.TITLE, value(), package))
-    return sorted(entries, key=lambda entry: (entry.lab.section, entry.slug))
+    return sorted(entries, key=lambda entry: (_place(entry.lab.section), entry.slug))
+
+
+def _chapter(package: str) -> Any:
+    try:
+        chapter = importlib.import_module(package)
+    except ModuleNotFoundError as error:
+        if not f"{package}.".startswith(f"{error.name}."):
+            raise  # It is there, and lacks something itself.
+        raise LabError(f"ORCLAB_LABS names {package}, which is not on Python's path") from None
+    if not all(hasattr(chapter, name) for name in ("NUMBER", "TITLE", "__path__")):
+        raise LabError(f"{package} is no chapter: make it a package with NUMBER and TITLE")
+    return chapter
+
+
+def _place(section: str) -> list[tuple[int, str]]:
+    """Sorts "2.9" before "2.10"."""
+    return [(int(part) if part.isdecimal() else 0, part) for part in section.split(".")]

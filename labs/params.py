@@ -65,7 +65,8 @@ class Knob(Tunable):
         return math.log1p(value / self.high * (LOG_SPAN - 1)) / math.log(LOG_SPAN)
 
     def at(self, position: float) -> float:
-        """The value at a slider position in [0, 1], rounded to three significant digits."""
+        """The value at a slider position in [0, 1]. On a logarithmic scale it has three
+        significant digits; the ends are exact."""
         if position <= 0.0:
             return self.low
         if position >= 1.0:

@@ -66,6 +66,9 @@ class World:
         self.state = self.lab.init(self.params, np.random.default_rng(self.seed))
         self.solution: Snapshot | None = None
         self._solver = self._start_solver()
+        if self.solving:
+            # Says that the events tell how far the solver went, even if it goes nowhere.
+            self._note(Event(0, "solve", "iterate", 0))
         first = self.lab.measure(self.params, self.state)
         scalars = [p.channel for p in self.lab.plots if isinstance(p, Readout)]
         self.recorder = Recorder(first, scalars, self._capacity)
@@ -78,7 +81,8 @@ class World:
 
     @property
     def trouble(self) -> str:
-        return self.state.trouble
+        trouble: str = self.state.trouble
+        return trouble
 
     def change(self, changes: Mapping[str, object]) -> None:
         """New values for some parameters, seen from the next step on. Raises ParameterError."""
@@ -178,7 +182,7 @@ class World:
     def command(self) -> str:
         """The `orclab run` line that reproduces this run up to now.
 
-        Raises LabError where a line cannot hold it (dragging, hundreds of changes)."""
+        Raises LabError where a line cannot hold it (hundreds of changes, as by dragging)."""
         if not self.complete or len(self.events) > 200:
             raise LabError(
                 f"{len(self.events)} changes are too many for a command line: export the run as "
@@ -215,7 +219,8 @@ def run(
     """Runs a lab headless to the end of `seconds`, or to trouble.
 
     `events` are applied before the step they name. A lab with a solver is solved to the end
-    before time starts, unless `events` say how far. `progress` hears the part done in [0, 1]."""
+    before time starts and after each change, unless `events` say how far. `progress` hears the
+    part done in [0, 1]."""
     entry = find(slug)
     period = entry.lab.period
     if not 0 <= seconds <= MAX_STEPS * period:
@@ -226,11 +231,11 @@ def run(
     todo = sorted(events, key=lambda event: event.step)
     world = World(entry, changes, seed, capacity=steps + 1)
     told = any(event.kind == "solve" for event in todo)
-    while world.solving and not told:
-        world.iterate()
     for step in range(steps + 1):
         while todo and todo[0].step <= step:
             _apply(world, todo.pop(0))
+        while world.solving and not told:
+            world.iterate()
         if step == steps or world.trouble:
             break
         world.advance()
@@ -244,10 +249,30 @@ def run(
 
 
 def events_of(about: Mapping[str, Any]) -> list[Event]:
-    """The events of an exported recording, to run it again."""
+    """The events of an exported recording, to run it again. Raises LabError."""
     if not about["changes_complete"]:
         raise LabError("this recording lost its early changes: it cannot be run again exactly")
-    return [Event(c["step"], c["kind"], c["name"], c["value"]) for c in about["changes"]]
+    return [_event_of(change) for change in about["changes"]]
+
+
+def _event_of(change: Mapping[str, Any]) -> Event:
+    step, kind, name, value = (change[key] for key in ("step", "kind", "name", "value"))
+    match kind:
+        case "set":
+            sound = isinstance(value, float | int | str)
+        case "press":
+            sound = value is None
+        case "hold":
+            point = value if isinstance(value, list | tuple) else ()
+            numbers = len(point) == 3 and all(type(x) in (int, float) for x in point)
+            sound = value is None or numbers
+        case "solve":
+            sound = type(value) is int and value >= 0
+        case _:
+            sound = False
+    if not (sound and type(step) is int and step >= 0 and isinstance(name, str)):
+        raise LabError(f"no change of a run looks like {str(dict(change))[:200]}")
+    return Event(step, kind, name, value)
 
 
 def parse_event(entry: Entry, at: str, what: str) -> Event:
@@ -266,7 +291,7 @@ def parse_event(entry: Entry, at: str, what: str) -> Event:
         case "hold":
             handle, _, where = value.partition(":")
             return Event(step, "hold", handle, _point(where))
-        case "iterate" if value.isdigit():
+        case "iterate" if value.isdecimal():
             return Event(step, "solve", "iterate", int(value))
         case _:
             return Event(step, "set", name, entry.lab.Params.read({name: value})[name])
@@ -294,8 +319,10 @@ def _apply(world: World, event: Event) -> None:
         case "hold":
             world.hold(event.name, event.value and tuple(event.value))
         case "solve":
-            for _ in range(event.value):
+            left = event.value
+            while left and world.solving:
                 world.iterate()
+                left -= 1
 
 
 def _text(value: Value) -> str:

@@ -151,7 +151,7 @@ def test_a_whole_number_is_a_number() -> None:
 
 def test_parameters_are_frozen() -> None:
     with pytest.raises(ValidationError):
-        Sample().kp = 1.0  # type: ignore[misc]
+        Sample().kp = 1.0
 
 
 def test_a_change_makes_a_new_set_and_leaves_the_old() -> None:

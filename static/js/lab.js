@@ -132,6 +132,7 @@ session.addEventListener("status", ({ detail: status }) => {
 let recovering = false;
 session.addEventListener("notice", ({ detail: { state, text } }) => {
   recovering = state === "recovering" || state === "failed";
+  if (state === "ended") return; // the phase says it
   if (state === "live") {
     stage.say("");
     if (text) toast(text);

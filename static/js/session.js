@@ -33,9 +33,10 @@ export class Session extends EventTarget {
   // Asks the server for a session. `news` is said once it lives.
   async create(news = "") {
     clearTimeout(this.timer);
-    this.closed = false;
-    this.info = null;
-    this.sceneLoaded = this.told = false;
+    this.drop();
+    this.end();
+    this.closed = this.ended = false;
+    this.sceneLoaded = this.told = this.live = false;
     this.restore = news !== "" || this.want.running !== null;
     this.news = news;
     this.tell("phase", { phase: "worker", text: news });
@@ -64,14 +65,19 @@ export class Session extends EventTarget {
     this.info = info;
     this.tries = 0;
     this.tell("phase", { phase: "robot", text: "" });
-    const address = `${info.scene}?hideViserLogo${this.view().dark ? "&darkMode" : ""}`;
-    // Replacing leaves no entry behind in the browser's history.
-    if (this.frame.src) this.frame.contentWindow.location.replace(address);
-    else this.frame.src = address;
+    this.showScene();
     this.listen();
   }
 
+  showScene() {
+    const address = `${this.info.scene}?hideViserLogo${this.view().dark ? "&darkMode" : ""}`;
+    // Replacing leaves no entry behind in the browser's history.
+    if (this.frame.src) this.frame.contentWindow.location.replace(address);
+    else this.frame.src = address;
+  }
+
   listen() {
+    let hellos = 0;
     const socket = new WebSocket(location.origin.replace(/^http/, "ws") + this.info.stream);
     this.socket = socket;
     this.heard = performance.now();
@@ -80,7 +86,9 @@ export class Session extends EventTarget {
       this.heard = performance.now();
       const message = JSON.parse(event.data);
       if (message.type === "status") this.noteStatus(message);
+      if (message.type === "hello" && hellos++ > 0) this.showScene(); // of the worker that took over
       this.tell(message.type, message);
+      if (message.type === "notice" && message.state === "ended") this.rest(message.text);
     };
     socket.onclose = () => {
       if (socket === this.socket) this.reconnect();
@@ -92,9 +100,13 @@ export class Session extends EventTarget {
     if (this.restore) {
       // A session that takes over from a lost one goes on as that one did.
       this.restore = false;
-      if (speed !== this.want.speed) this.send({ command: "speed", factor: this.want.speed });
-      if (this.want.running === false && status.running) this.send({ command: "pause" });
-      if (this.want.running && !status.running && !status.trouble) this.send({ command: "run" });
+      const { speed: factor, running } = this.want;
+      const commands = [];
+      if (factor !== speed) commands.push({ command: "speed", factor });
+      if (running === false && status.running) commands.push({ command: "pause" });
+      if (running && !status.running && !status.trouble) commands.push({ command: "run" });
+      // One that fails is no harm: the page shows what the server does.
+      for (const command of commands) this.send(command).catch(() => {});
     } else {
       this.want = { params, seed, speed, running: status.running || status.trouble !== "" };
     }
@@ -105,7 +117,8 @@ export class Session extends EventTarget {
 
   // Live once both the stream has spoken and the scene has loaded.
   settle() {
-    if (!this.told || !this.sceneLoaded) return;
+    if (this.live || !this.told || !this.sceneLoaded) return;
+    this.live = true;
     this.tell("phase", { phase: "live", text: this.news });
     this.news = "";
   }
@@ -114,7 +127,7 @@ export class Session extends EventTarget {
     clearTimeout(this.timer);
     this.drop();
     if (this.closed) return;
-    this.told = false;
+    this.told = this.live = false;
     this.tell("phase", { phase: "lost", text: "The connection was lost. Trying again …" });
     const { status } = await request("GET", `/api/sessions/${this.info.id}`);
     if (this.closed || this.socket) return;
@@ -124,11 +137,17 @@ export class Session extends EventTarget {
     } else if (status === 404 && document.visibilityState === "visible") {
       this.create("The session had ended. A new one goes on with your parameters.");
     } else if (status === 404) {
-      this.ended = true; // nobody looks: no new session until somebody does
-      this.tell("phase", { phase: "ended", text: "The session has ended." });
+      this.rest("The session has ended.");
     } else {
       this.timer = setTimeout(() => (status === 200 ? this.listen() : this.reconnect()), this.delay());
     }
+  }
+
+  // Nobody uses the session: no new one until somebody does.
+  rest(text) {
+    this.ended = true;
+    this.drop();
+    this.tell("phase", { phase: "ended", text });
   }
 
   delay() {
@@ -139,7 +158,6 @@ export class Session extends EventTarget {
   hurry() {
     if (document.visibilityState !== "visible" || this.closed || !this.info) return;
     if (this.ended) {
-      this.ended = false;
       this.create("The session had ended. A new one goes on with your parameters.");
     } else if (!this.socket || performance.now() - this.heard > 3000) {
       this.tries = 0;
@@ -161,7 +179,13 @@ export class Session extends EventTarget {
     this.closed = true;
     clearTimeout(this.timer);
     this.drop();
-    if (this.info) fetch(`/api/sessions/${this.info.id}`, { method: "DELETE", keepalive: true });
+    this.end();
+  }
+
+  end() {
+    const { id } = this.info ?? {};
+    this.info = null;
+    if (id) fetch(`/api/sessions/${id}`, { method: "DELETE", keepalive: true }).catch(() => {});
   }
 
   // Commands and changes. Both throw an Error with the server's sentence.

@@ -1,0 +1,129 @@
+"""The scene and its panel through the proxy, as a browser's client sees them."""
+
+from collections import Counter
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from tests.served import Served
+from tests.viser_client import PROTOCOL, SceneClient, message
+
+
+def test_the_robot_is_a_tree_of_its_joints(served: Served) -> None:
+    chain = (
+        "shoulder_pan_joint/shoulder_lift_joint/elbow_joint/wrist_1_joint/wrist_2_joint"
+        "/wrist_3_joint"
+    )
+    with served.session("joint-control") as session, SceneClient(session) as scene:
+        turned: Counter[str] = Counter()
+        for found, _ in zip(scene.messages(), range(600), strict=False):
+            if found["type"] == "SetOrientationMessage":
+                turned[found["name"]] += 1
+        leaves = {name.split("/")[1] for name in scene.nodes if name.endswith(chain)}
+        assert len(leaves) == 2, "the robot and its ghost"
+        joints = {f"/{arm}/{'/'.join(chain.split('/')[:n])}" for arm in leaves for n in range(1, 7)}
+        assert all(turned[joint] > 3 for joint in joints), "every joint of both turns"
+        placed = {name: n for name, n in turned.items() if name not in joints}
+        assert set(placed.values()) <= {1}, "what a joint carries is placed once"
+
+
+def test_a_slider_in_the_panel_changes_the_world_and_the_page(served: Served) -> None:
+    with (
+        served.session("oscillator") as session,
+        session.stream() as stream,
+        SceneClient(session) as scene,
+    ):
+        scene.set("ω [rad/s]", 7.5)
+        changed = stream.next("status", lambda s: s["params"]["omega"] == 7.5)
+        assert changed["run"] == 1, "a live parameter restarts nothing"
+
+
+def test_a_logarithmic_slider_and_its_number_agree(served: Served) -> None:
+    with (
+        served.session("oscillator") as session,
+        session.stream() as stream,
+        SceneClient(session) as scene,
+    ):
+        scene.set("k_p", 1000.0)
+        stream.next("status", lambda s: s["params"]["gain"] == 1000.0)
+        scene.shows("1/s", [1.0])
+        scene.set("1/s", [0.0])
+        stream.next("status", lambda s: s["params"]["gain"] == 0.0)
+        scene.shows("k_p", 0.0)
+
+
+def test_a_change_through_the_api_moves_the_panel(served: Served) -> None:
+    with served.session("oscillator") as session, SceneClient(session) as scene:
+        session.set(omega=3.25, shape="square", noisy=True)
+        scene.shows("ω [rad/s]", 3.25)
+        scene.shows("Shape", "Square")
+        scene.shows("Noise", True)
+
+
+def test_a_refused_value_is_put_back(served: Served) -> None:
+    with served.session("oscillator") as session, SceneClient(session) as scene:
+        scene.set("ω [rad/s]", 1e6)
+        scene.shows("ω [rad/s]", 2.0)
+
+
+def test_the_panels_button_presses_the_action(served: Served) -> None:
+    with (
+        served.session("oscillator") as session,
+        session.stream() as stream,
+        SceneClient(session) as scene,
+    ):
+        scene.set("Kick", True)
+        stream.next("telemetry", lambda m: m["rows"] and m["rows"][-1][5] == 1.0)
+
+
+def test_a_dragged_handle_reaches_the_world(served: Served) -> None:
+    def drag(phase: str, x: float) -> bytes:
+        return message(
+            "SceneNodeDragMessage",
+            phase=phase,
+            name="/pull",
+            instance_index=None,
+            start_position=(0.0, 0.0, 0.8),
+            start_screen_pos=(0.0, 0.0),
+            end_position=(x, 0.0, 0.8),
+            end_screen_pos=(0.0, 0.0),
+            button="left",
+            modifier=None,
+            owner="",
+        )
+
+    with (
+        served.session("oscillator") as session,
+        session.stream() as stream,
+        SceneClient(session) as scene,
+    ):
+        scene.socket.send(drag("start", 0.1))
+        scene.socket.send(drag("update", 0.75))
+        stream.next("telemetry", lambda m: m["rows"] and m["rows"][-1][6] == 0.75)
+        scene.socket.send(drag("end", 0.8))
+        stream.next("telemetry", lambda m: m["rows"] and m["rows"][-1][6] == 0.0)
+        changes = session.export()["changes"]
+        assert [c["value"] for c in changes if c["kind"] == "hold"][-1] is None
+
+
+def test_the_scene_of_an_unknown_session_is_closed_for_good(served: Served) -> None:
+    address = served.address.replace("http", "ws") + "/scene/guess"
+    with connect(address, subprotocols=[PROTOCOL]) as socket:  # type: ignore[list-item]
+        with pytest.raises(ConnectionClosed) as closed:
+            socket.recv()
+        assert closed.value.rcvd is not None
+        assert closed.value.rcvd.code == 4404
+
+
+def test_a_client_of_another_protocol_is_refused(served: Served) -> None:
+    with served.session("oscillator") as session, pytest.raises(InvalidStatus):
+        connect(served.address.replace("http", "ws") + session.info["scene"].rstrip("/"))
+
+
+def test_the_view_can_be_changed_while_it_runs(served: Served) -> None:
+    with served.session("joint-control") as session, SceneClient(session) as scene:
+        session.command("view", view={"dark": True, "graphics": "low"})
+        theme = scene.read_until(lambda m: m["type"] == "ThemeConfigurationMessage")
+        assert theme["dark_mode"] is True
+        scene.read_until(lambda m: "Mesh" in m["type"] and "wrist_3_joint" in m.get("name", ""))

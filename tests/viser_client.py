@@ -1,0 +1,115 @@
+"""A bare client of Viser's protocol: what a browser's scene says and hears, without a browser."""
+
+import struct
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import Any, Self
+
+import msgspec
+import zstandard
+from websockets.sync.client import connect
+
+from tests.served import Opened
+
+PROTOCOL = "viser-v1.1.1"
+
+
+def decode(window: bytes) -> list[dict[str, Any]]:
+    """The messages of one window (arrays are left where they are)."""
+    _, size = struct.unpack_from("<QQ", window)
+    inner = zstandard.ZstdDecompressor().decompress(window[16 : 16 + size])
+    messages: list[dict[str, Any]] = msgspec.msgpack.decode(inner)["messages"]
+    return messages
+
+
+def camera() -> bytes:
+    """What makes a client count as connected."""
+    return message(
+        "ViewerCameraMessage",
+        wxyz=(1, 0, 0, 0),
+        position=(1, 1, 1),
+        fov=1.0,
+        near=0.01,
+        far=100.0,
+        image_height=600,
+        image_width=800,
+        look_at=(0, 0, 0),
+        up_direction=(0, 0, 1),
+    )
+
+
+def message(kind: str, **fields: Any) -> bytes:
+    return msgspec.msgpack.encode({"type": kind, **fields})
+
+
+class SceneClient:
+    """`with SceneClient(session) as scene: scene.set("ω [rad/s]", 3.0)`."""
+
+    def __init__(self, session: Opened) -> None:
+        address = session.server.address.replace("http", "ws") + session.info["scene"].rstrip("/")
+        self.socket = connect(
+            address,
+            subprotocols=[PROTOCOL],  # type: ignore[list-item]
+            max_size=None,
+            compression=None,
+            origin=session.server.address,  # type: ignore[arg-type]
+        )
+        self.controls: dict[str, str] = {}  # uuid by label
+        self.values: dict[str, Any] = {}  # what is shown, by uuid
+        self.nodes: set[str] = set()
+        self._unread: deque[dict[str, Any]] = deque()
+        self.socket.send(camera())
+        self.read_until(lambda m: m["type"] == "ReplayDoneMessage")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.socket.close()
+
+    def messages(self, timeout: float = 20.0) -> Iterator[dict[str, Any]]:
+        """All messages as they come, noted. Fails after `timeout` seconds of silence."""
+        while True:
+            while self._unread:
+                found = self._unread.popleft()
+                self._note(found)
+                yield found
+            window = self.socket.recv(timeout)
+            assert isinstance(window, bytes)
+            self._unread.extend(decode(window))
+
+    def read_until(self, true: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+        end = time.monotonic() + 20
+        for found in self.messages():
+            if true(found):
+                return found
+            assert time.monotonic() < end, "no such scene message came"
+        raise AssertionError
+
+    def set(self, label: str, value: Any) -> None:
+        """Moves a control as a hand would."""
+        update = {"value": value}
+        self.socket.send(message("GuiUpdateMessage", uuid=self.control(label), updates=update))
+
+    def control(self, label: str) -> str:
+        """The uuid of a control; waits for a panel that is still being built."""
+        if label not in self.controls:
+            self.read_until(lambda _: label in self.controls)
+        return self.controls[label]
+
+    def shows(self, label: str, value: Any) -> None:
+        """Waits until a control shows a value. Fails after 20 s."""
+        uuid = self.control(label)
+        if self.values[uuid] != value:
+            self.read_until(lambda _: self.values[uuid] == value)
+
+    def _note(self, found: dict[str, Any]) -> None:
+        match found:
+            case {"uuid": uuid, "props": {"label": str(label)}}:
+                self.controls[label] = uuid
+                self.values[uuid] = found.get("value")
+            case {"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}}:
+                self.values[uuid] = value
+            case {"name": str(name), "props": _}:
+                self.nodes.add(name)

@@ -31,7 +31,7 @@ def knobs(draw: st.DrawFn) -> Knob:
     scale = draw(st.sampled_from(["linear", "log", "log from zero"]))
     high = draw(st.floats(1e-3, 1e6))
     if scale == "linear":
-        return a_knob(high - draw(st.floats(1e-2, 1e3)), high, "linear")
+        return a_knob(high * (1.0 - draw(st.floats(1e-3, 1e3))), high, "linear")
     return a_knob(high / draw(st.floats(1.5, 1e6)) if scale == "log" else 0.0, high, "log")
 
 

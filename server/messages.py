@@ -184,6 +184,8 @@ class Status(Message):
     speed: float
     real_time_factor: float
     """Simulated seconds per second of the wall clock, over the last second."""
+    step_seconds: float
+    """Wall-clock time one step of the world took, on average over the last second."""
     capped: bool
     """The machine is too slow for the chosen speed: simulated time slows down."""
     trouble: str

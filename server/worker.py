@@ -201,6 +201,7 @@ class Live:
         """Simulated time follows the wall clock from here on."""
         self._wall0, self._steps0 = time.perf_counter(), self.world.steps
         self._pace.clear()
+        self._spent, self._taken = 0.0, 0  # [s] of the wall clock, steps
 
     def _steps_due(self, now: float) -> float:
         elapsed = (now - self._wall0) * self.speed
@@ -218,10 +219,13 @@ class Live:
         if not self._moving:
             return
         due = int(self._steps_due(now))
+        steps = self.world.steps
         for _ in range(due):
             if self.world.trouble or time.perf_counter() - now > 0.8 * FRAME:
                 break
             self.world.advance()
+        self._spent += time.perf_counter() - now
+        self._taken += self.world.steps - steps
         lag = self._steps_due(now) * self.world.lab.period / self.speed
         if lag > SLIP:
             self._wall0 += lag - SLIP
@@ -291,12 +295,14 @@ class Live:
             running=self.running,
             speed=self.speed,
             real_time_factor=factor if measuring else (self.speed if self._moving else 0.0),
+            step_seconds=self._spent / self._taken if self._taken else 0.0,
             capped=measuring and factor < 0.95 * self.speed,
             trouble=self.failure or self.world.trouble,
             solver="" if solution is None else solution.done or f"iteration {solution.iteration}",
             view=self.view,
         )
         self.link.send(STATUS, status.model_dump())
+        self._spent, self._taken = 0.0, 0
 
     # When the lab itself breaks -----------------------------------------------------------------
 

@@ -1,0 +1,33 @@
+"""Measures: `python -m tests.benchmarks [NAME ...]`; without names, everything.
+
+Figures of one run stand side by side; compare ratios, not seconds, across machines."""
+
+import argparse
+import platform
+
+from tests.benchmarks import headless, latency, load
+
+MEASURES = {
+    "headless": headless.ratio_to_bare_calls,
+    "slider": latency.slider_to_telemetry,
+    "page": latency.page_to_motion,
+    "twelve": load.twelve,
+    "growing": load.growing,
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m tests.benchmarks", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(MEASURES))
+    names = parser.parse_args().names or list(MEASURES)
+    unknown = sorted(set(names) - set(MEASURES))
+    if unknown:
+        parser.error(f"no measure is named {', '.join(unknown)}; there are {', '.join(MEASURES)}")
+    print(f"Python {platform.python_version()}, {platform.machine()}")
+    for name in names:
+        print(f"\n== {name}", flush=True)
+        MEASURES[name]()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,49 @@
+"""The simulator against the bare Pinocchio calls it needs, side by side."""
+
+import statistics
+import time
+
+import numpy as np
+import pinocchio as pin
+
+from labs.models.arms import ur5
+from labs.run import run
+
+SECONDS = 1.0
+ROUNDS = 41
+
+
+def ratio_to_bare_calls() -> None:
+    """UR5, PD with gravity compensation at 1 kHz, semi-implicit Euler at 1 ms: one call of aba
+    and one of computeGeneralizedGravity a step are what it cannot do without."""
+    steps = round(SECONDS / 1e-3)
+    run("joint-control", seconds=0.5)  # loads the robot
+    bare, whole = [], []
+    for _ in range(ROUNDS):
+        bare.append(_bare(steps))
+        whole.append(_whole())
+    ratios = [w / b for w, b in zip(whole, bare, strict=True)]
+    print(f"bare calls of Pinocchio: {1e6 * statistics.median(bare) / steps:.2f} us a step")
+    print(f"headless run, recorded:  {1e6 * statistics.median(whole) / steps:.2f} us a step")
+    print(
+        f"  ratio: median {statistics.median(ratios):.2f} "
+        f"({min(ratios):.2f} to {max(ratios):.2f}); "
+        f"{SECONDS / statistics.median(whole):.1f} x real time"
+    )
+
+
+def _bare(steps: int) -> float:
+    arm = ur5()
+    model, data = arm.model, arm.model.createData()
+    q, v, tau = arm.home.copy(), np.zeros(model.nv), np.zeros(model.nv)
+    begin = time.perf_counter()
+    for _ in range(steps):
+        pin.computeGeneralizedGravity(model, data, q)
+        pin.aba(model, data, q, v, tau)
+    return time.perf_counter() - begin
+
+
+def _whole() -> float:
+    begin = time.perf_counter()
+    run("joint-control", {"controller": "pd-gravity"}, seconds=SECONDS)
+    return time.perf_counter() - begin

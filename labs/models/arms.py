@@ -98,7 +98,7 @@ def ur5() -> Arm:
         tip=model.getFrameId("tool0"),
         visuals=_visuals(visual),
         collisions=_visuals(collision),
-        camera=((1.45, -1.25, 0.95), (0.2, 0.05, 0.36)),
+        camera=((1.05, -0.85, 0.75), (0.22, 0.05, 0.36)),
     )
 
 
@@ -121,7 +121,7 @@ def panda() -> Arm:
         tip=model.getFrameId("panda_hand_tcp"),
         visuals=_visuals(visual),
         collisions=_visuals(collision),
-        camera=((1.6, -1.35, 1.05), (0.12, 0.05, 0.42)),
+        camera=((1.1, -0.95, 0.85), (0.14, 0.03, 0.42)),
     )
 
 
@@ -157,7 +157,7 @@ def double_pendulum() -> Arm:
         tip=tip,
         visuals=tuple(visuals),
         collisions=tuple(visuals),
-        camera=((2.6, 0.9, 1.35), (0.0, 0.2, 0.95)),
+        camera=((1.9, 0.7, 1.2), (0.0, 0.25, 0.85)),
     )
 
 

@@ -175,6 +175,22 @@ def test_what_is_proposed_works_on_the_nonlinear_robot(fault: str) -> None:
         assert growth_of_the_robot(proposal, 1e-7, 20.0) < 0.01
 
 
+def test_a_proposed_step_divides_the_control_period() -> None:
+    """2 ms would do as well as 1 ms here, but 5 ms is no whole number of its steps."""
+    setting = replace(UNSTABLE["integrator"], period=5e-3, step=5e-3, gains=Gains(200.0, 0.0, 0.8))
+    steps = [proposal.step for proposal in remedies(linear(), setting, MENU)]
+    assert steps == [5e-3, 1e-3]
+
+
+def test_a_proposed_gain_is_no_more_cautious_than_it_must_be() -> None:
+    loop = linear()
+    for fault, kd, ki in (("period", 1.1, 1.0), ("integrator", 0.9, 1.0), ("gains", 1.0, 1.1)):
+        last = remedies(loop, UNSTABLE[fault], MENU)[0 if fault == "gains" else -1]
+        bolder = Gains(last.gains.kp, ki * last.gains.ki, kd * last.gains.kd)
+        assert loop.growth(last) <= GROWS
+        assert loop.growth(replace(last, gains=bolder)) > GROWS
+
+
 def test_the_default_is_stable_for_every_robot() -> None:
     for robot in ("ur5", "panda", "double-pendulum"):
         diagnosis = linear(robot).diagnose(DEFAULT)

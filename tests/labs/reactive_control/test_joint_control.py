@@ -325,6 +325,52 @@ def test_a_slow_controller_looks_across_world_steps() -> None:
     assert changes == [5, 10, 15, 20, 25, 30, 35, 40, 45]
 
 
+def test_the_reference_is_the_one_asked_for_at_its_time() -> None:
+    home = plant("ur5").arm.home
+    for k, state in enumerate(states(with_({}, amplitude=0.25, frequency=0.7), 4.0)):
+        sine = 0.25 * np.sin(2 * np.pi * 0.7 * k * LAB.period)
+        np.testing.assert_allclose(state.q_ref, home + sine, atol=1e-12)
+    for k, state in enumerate(states(with_({}, reference="minimum-jerk", duration=0.5), 3.0)):
+        if k * LAB.period % 1.5 in (0.5, 0.75):
+            np.testing.assert_allclose(state.q_ref, home + 0.3, atol=1e-12)
+
+
+def test_the_controller_sees_the_reference_of_its_own_tick() -> None:
+    """At 5 ms the last tick of a world step is 5 ms before its end."""
+    params = with_({"controller": "open-loop", "control_period": 0.005}, frequency=1.0)
+    known = plant("ur5")
+    for state in list(states(params, 0.3))[1:]:
+        phase = 2 * np.pi * (state.t - 0.005)
+        s, v, a = (
+            0.3 * np.sin(phase),
+            0.3 * 2 * np.pi * np.cos(phase),
+            -0.3 * (2 * np.pi) ** 2 * np.sin(phase),
+        )
+        ones = np.ones(6)
+        tau = pin.rnea(known.model, known.data, known.arm.home + s, v * ones, a * ones)
+        np.testing.assert_allclose(state.torque, tau, rtol=1e-9, atol=1e-9)
+
+
+def test_eigenvalues_are_those_of_the_loop_with_its_payload_and_friction() -> None:
+    params = with_({}, payload=4.0, friction=3.0, amplitude=0.0)
+    state = LAB.init(params, np.random.default_rng(0))
+    world, q0, d = plant("ur5", 4.0), state.q_ref, 1e-6
+
+    # What holds the payload where the loop is linearised, so that it rests there.
+    held = pin.computeGeneralizedGravity(world.model, world.data, q0) - gravity(params, q0)
+
+    def rate(x: np.ndarray) -> np.ndarray:
+        q, v = x[:6], x[6:]
+        tau = held + params.kp * (q0 - q) - params.kd * v + gravity(params, q)
+        return np.concatenate([v, world.acceleration(tau, 3.0)(q, v)])
+
+    at = np.concatenate([q0, np.zeros(6)])
+    slope = np.array([(rate(at + d * e) - rate(at - d * e)) / (2 * d) for e in np.eye(12)]).T
+    fields = LAB.fields(params, state)
+    found = np.sort_complex(fields["poles_re"] + 1j * fields["poles_im"])
+    np.testing.assert_allclose(found, np.sort_complex(np.linalg.eigvals(slope)), rtol=1e-5)
+
+
 def test_changing_the_frequency_live_does_not_move_the_reference() -> None:
     slow, fast = with_({}), with_({}, frequency=2.0)
     state = last(slow, 1.23)

@@ -7,13 +7,12 @@ const SHEET_HANDLE = 'div[style*="cursor: pointer"][style*="3.5em"]';
 
 export function tidyFrame(frame) {
   const until = performance.now() + PATIENCE;
-  let folded = false;
   const timer = setInterval(() => {
     const page = frame.contentDocument;
     if (!page || performance.now() > until) return clearInterval(timer);
-    const handle = folded ? null : page.querySelector(SHEET_HANDLE);
-    if (handle) {
-      folded = true;
+    const handle = page.querySelector(SHEET_HANDLE);
+    if (handle && !handle.dataset.folded) {
+      handle.dataset.folded = "once"; // a second tap would open it again
       handle.click();
     }
     for (const note of page.querySelectorAll('[role="alert"]')) {

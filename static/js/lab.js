@@ -99,7 +99,8 @@ session.addEventListener("phase", ({ detail: { phase, text } }) => {
   } else {
     stage.hold(true);
     const buttons = phase === "lost" ? {} : phase === "ended" ? { Continue: () => session.hurry() } : retry;
-    stage.say(text, { warn: true, buttons });
+    const more = phase === "full" ? " This page asks again every ten seconds." : "";
+    stage.say(text + more, { warn: true, buttons });
   }
 });
 

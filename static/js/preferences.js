@@ -40,7 +40,7 @@ export function theme() {
 
 // What the 3D scene is asked for.
 export function view() {
-  graphics ??= drawsInSoftware() ? "low" : "high";
+  graphics ??= navigator.connection?.saveData || drawsInSoftware() ? "low" : "high";
   const dark = theme() === "dark" || (theme() === "system" && systemDark.matches);
   return { dark, graphics };
 }

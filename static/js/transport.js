@@ -27,6 +27,7 @@ export class Transport {
   }
 
   toggle() {
+    if (!this.run) return null;
     // After trouble the world waits for a reset; to run means to begin anew.
     if (this.status?.trouble) return this.send({ command: "reset" }).then(() => this.send({ command: "run" }));
     return this.send({ command: this.status?.running ? "pause" : "run" });
@@ -39,6 +40,7 @@ export class Transport {
   }
 
   setSpeed(factor) {
+    if (!this.speed) return null;
     const bounded = Math.min(4, Math.max(0.1, factor));
     this.showSpeed(bounded);
     this.chosen = performance.now();
@@ -69,6 +71,7 @@ export class Transport {
     const running = status.running && !status.trouble;
     this.run.setAttribute("aria-pressed", String(running));
     this.run.querySelector("span").textContent = running ? "Pause" : "Run";
+    if (!this.speed) return; // a solver without a world has no clock
     this.showTime(status.t);
     this.showPace(status);
     // A thumb in motion is not pulled back by what the server said a moment ago.

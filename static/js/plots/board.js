@@ -33,7 +33,7 @@ export class Board {
       this.window = Number(select.value);
       this.unzoom();
     });
-    if (select && !this.series.length) select.closest("label").hidden = true;
+    if (select) document.getElementById("tools").hidden = this.series.length === 0;
   }
 
   hello({ columns }) {

@@ -1,6 +1,5 @@
 // A small matrix in digits.
 
-import { number } from "../format.js";
 import { card, element } from "./card.js";
 import { symbol } from "./symbol.js";
 
@@ -16,6 +15,7 @@ export class Matrix {
     const rows = fields[this.plot.field];
     if (!rows) return;
     const cells = rows.map((row) => [row].flat());
+    const decimals = decimalsFor(cells.flat());
     if (this.table.rows.length !== cells.length || this.table.rows[0]?.cells.length !== cells[0].length) {
       this.table.replaceChildren(...cells.map((row) => {
         const made = element("tr");
@@ -24,11 +24,23 @@ export class Matrix {
       }));
     }
     cells.forEach((row, i) => row.forEach((value, j) => {
-      const text = number(value, 3);
+      const text = digits(value, decimals);
       const cell = this.table.rows[i].cells[j];
       if (cell.textContent !== text) cell.textContent = text;
     }));
   }
 
   clear() {}
+}
+
+// All entries have the same decimals, three digits of the largest: columns stand in line.
+function decimalsFor(values) {
+  const largest = Math.max(...values.map((value) => Math.abs(value ?? 0)), 1e-9);
+  return Math.min(8, Math.max(0, 2 - Math.floor(Math.log10(largest))));
+}
+
+function digits(value, decimals) {
+  if (!Number.isFinite(value)) return "—";
+  const text = value.toFixed(decimals);
+  return Number(text) === 0 ? "0" : text.replace("-", "−");
 }

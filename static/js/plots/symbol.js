@@ -1,10 +1,22 @@
-// Symbols as MathML, and a vector's component as its subscript: q becomes q₂, qʳᵉᶠ becomes q₂ʳᵉᶠ.
+// Symbols as MathML, and a vector's component as its subscript: q becomes q₂, qʳᵉᶠ becomes q₂ʳᵉᶠ,
+// and of "e = r − q" what stands left of the equals sign.
 
 const MATHML = "http://www.w3.org/1998/Math/MathML";
 
 export function symbol(mathml, component = null) {
   const math = new DOMParser().parseFromString(mathml, "text/html").querySelector("math");
   if (component === null) return math;
+  const parts = [...math.children];
+  const equals = parts.findIndex((part) => part.localName === "mo" && part.textContent === "=");
+  if (equals > 0) parts.splice(equals).forEach((part) => part.remove());
+  const sign = parts[0].localName === "mo" && /^[-−+]$/.test(parts[0].textContent) ? parts[0] : null;
+  sign?.remove();
+  index(math, component);
+  if (sign) math.prepend(sign);
+  return math;
+}
+
+function index(math, component) {
   const number = make("mn", String(component + 1));
   const only = math.childElementCount === 1 ? math.firstElementChild : null;
   const kind = only?.localName;
@@ -29,7 +41,6 @@ export function symbol(mathml, component = null) {
     indexed.append(base, number);
     math.append(indexed);
   }
-  return math;
 }
 
 function make(name, text = "") {

@@ -401,8 +401,7 @@ class JointControl(Lab[JointParams, JointState]):
         steps = units(self.period) // h
         due, since = ticks(state.since, units(params.control_period), h, steps)
 
-        offsets = np.array((0, *due, steps)) * (h * UNIT)
-        phase = state.phase + params.rate * offsets
+        phase = state.phase + params.rate * _offsets(due, steps, h)
         q_ref, v_ref, a_ref = self._reference(params, phase)
         loop = self._loop(params, world, force, state.torque.copy())
         with np.errstate(all="ignore"):
@@ -416,7 +415,8 @@ class JointControl(Lab[JointParams, JointState]):
                 state.v,
                 state.integral if params.integrates else np.zeros_like(state.q),
             )
-        if not float(np.abs(v).max()) <= FASTEST:
+            diverging = _diverging(v)
+        if diverging:
             return self._diverged(params, world, state)
 
         count = state.steps + 1
@@ -572,6 +572,20 @@ class JointControl(Lab[JointParams, JointState]):
 def _law(controller: str, robot: str, gains: Gains) -> Law:
     known = plant(robot)
     return LAWS[controller](known.model, known.data, gains)
+
+
+@lru_cache(maxsize=256)
+def _offsets(due: tuple[int, ...], steps: int, h: int) -> np.ndarray:
+    """Times [s] after a world step's start: its start, its control ticks and its end."""
+    return np.array((0, *due, steps)) * (h * UNIT)
+
+
+def _diverging(v: np.ndarray) -> bool:
+    """Whether a joint is faster than `FASTEST` or no number; the sum of squares, quick to
+    compute, says for most that none is."""
+    if float(v @ v) <= FASTEST**2:
+        return False
+    return not float(np.abs(v).max()) <= FASTEST
 
 
 @cache

@@ -460,10 +460,8 @@ def test_the_same_seed_and_events_give_the_same_run(entry: Entry) -> None:
     assert same(a.state, b.state)
 
 
-@every_lab
+@pytest.mark.parametrize("entry", [e for e in ENTRIES if _noisy(e)], ids=lambda entry: entry.slug)
 def test_another_seed_gives_another_run_where_there_is_noise(entry: Entry) -> None:
-    if not _noisy(entry):
-        pytest.skip("no noise")
     a, b = (run(entry.slug, _noisy(entry), seconds=SECONDS, seed=seed) for seed in (3, 4))
     assert a.recording().rows.tobytes() != b.recording().rows.tobytes()
 
@@ -510,13 +508,13 @@ def test_a_step_leaves_the_old_state_alone(entry: Entry) -> None:
     assert same(old, before)
 
 
-@every_lab
+@pytest.mark.parametrize(
+    "entry", [e for e in ENTRIES if e.lab.has_solver()], ids=lambda entry: entry.slug
+)
 def test_a_solver_ends_with_a_reason_and_accepting_leaves_the_old_state_alone(
     entry: Entry,
 ) -> None:
     lab, world = entry.lab, World(entry)
-    if not lab.has_solver():
-        pytest.skip("no solver")
     snapshots: list[Snapshot] = []
     for snapshot in lab.solve(world.params, world.state):
         snapshots.append(snapshot)

@@ -152,12 +152,17 @@ class World:
         same = last and (last.step, last.kind, last.name) == (event.step, event.kind, event.name)
         if last and same and event.kind == "solve":
             self.events[-1] = Event(event.step, "solve", event.name, last.value + 1)
-        elif same and event.kind in ("set", "hold"):
+        elif same and (event.kind == "hold" or self._is_live(event)):
             self.events[-1] = event
         elif len(self.events) < MAX_EVENTS:
             self.events.append(event)
         else:
             self.complete = False
+
+    def _is_live(self, event: Event) -> bool:
+        """Whether only the last such change in a step matters. There and back, a change that
+        starts the solver again has started it."""
+        return event.kind == "set" and self.params.tunables[event.name].effect == "live"
 
     def recording(self) -> Recording:
         """What was recorded so far, with all that reproduces it."""

@@ -12,7 +12,9 @@ from labs.scene import Scene
 
 
 class OscillatorParams(Params):
-    omega: float = knob(2.0, 0.1, 10.0, symbol=r"\omega", unit="rad/s", help="Frequency.")
+    omega: float = knob(
+        2.0, 0.1, 10.0, symbol=r"\omega", unit="rad/s", help="Frequency.", label="ω"
+    )
     gain: float = knob(10.0, 0.0, 1000.0, symbol="k_p", unit="1/s", help="Gain.", scale="log")
     shape: str = choice("sine", {"sine": "Sine", "square": "Square"}, help="Form.", label="Shape")
     noisy: bool = toggle(False, help="Adds noise.", label="Noise")

@@ -1,0 +1,82 @@
+"""What the page says and does when something breaks."""
+
+import os
+import re
+import signal
+
+from playwright.sync_api import Browser, Page, expect
+
+from tests.browser.conftest import screenshot
+from tests.browser.lab_page import LabPage
+from tests.served import Served, until
+
+
+def test_a_killed_worker_comes_back_with_the_same_parameters(page: Page, served: Served) -> None:
+    until(lambda: served.health()["spares"] == 1 and served.health()["sessions"] == 0)
+    (worker,) = served.listeners()
+    lab = LabPage(page).open("joint-control", "?kp=640&controller=pid")
+    page.wait_for_timeout(1500)
+    os.kill(worker, signal.SIGKILL)
+    expect(page.locator("body")).to_contain_text("SIGKILL")
+    lab.wait_live()
+    expect(lab.value("kp")).to_have_value("640")
+    t = lab.time()
+    expect(page.locator("#clock span")).not_to_have_text(f"{t:.2f}")
+    # The scene has come back as well, and its sliders work.
+    box = lab.row("k_p").get_by_role("textbox")
+    expect(box).to_have_value("640")
+    box.fill("650")
+    box.press("Enter")
+    expect(lab.value("kp")).to_have_value("650")
+
+
+def test_a_restarted_server_is_found_again(chromium: Browser) -> None:
+    with Served() as server:
+        context = chromium.new_context(base_url=server.address)
+        lab = LabPage(context.new_page()).open("joint-control", "?kp=512")
+        old = lab.status()["id"]
+        server.stop()
+        expect(lab.page.locator("body")).to_contain_text(re.compile("lost|does not answer"))
+        screenshot(lab.page, "lost")
+        server.start()
+        lab.wait_live()
+        expect(lab.page.locator("body")).to_contain_text("your parameters")
+        expect(lab.value("kp")).to_have_value("512")
+        assert lab.status()["id"] != old
+        context.close()
+
+
+def test_a_full_house_says_so_and_lets_in_when_there_is_room(chromium: Browser) -> None:
+    with Served(ORCLAB_MAX_SESSIONS="1") as server:
+        context = chromium.new_context(base_url=server.address)
+        with server.session("oscillator"):
+            page = context.new_page()
+            page.goto("/labs/joint-control")
+            expect(page.locator("body")).to_contain_text("all 1 places are taken")
+            screenshot(page, "full")
+        retry = page.get_by_role("button", name=re.compile("again|retry", re.IGNORECASE))
+        retry.first.click()
+        LabPage(page).wait_live()
+        context.close()
+
+
+def test_an_idle_session_rests_until_it_is_wanted(chromium: Browser) -> None:
+    with Served(ORCLAB_UNTOUCHED_SECONDS="4") as server:
+        context = chromium.new_context(base_url=server.address)
+        lab = LabPage(context.new_page()).open("joint-control", "?kp=512")
+        expect(lab.page.locator("#banner")).to_contain_text("same parameters")
+        until(lambda: server.health()["sessions"] == 0)
+        lab.page.wait_for_timeout(1000)
+        assert server.health()["sessions"] == 0, "it rests"
+        lab.page.locator("#banner button").first.click()
+        lab.wait_live()
+        expect(lab.value("kp")).to_have_value("512")
+        context.close()
+
+
+def test_a_closed_page_frees_its_place(page: Page, served: Served) -> None:
+    until(lambda: served.health()["sessions"] == 0)
+    LabPage(page).open("joint-control")
+    assert served.health()["sessions"] == 1
+    page.goto("about:blank")
+    until(lambda: served.health()["sessions"] == 0)

@@ -1,0 +1,35 @@
+"""The home page in a browser."""
+
+from playwright.sync_api import Page, expect
+
+from tests.browser.conftest import screenshot
+
+
+def test_the_course_lies_open(page: Page) -> None:
+    page.goto("/")
+    card = page.get_by_role("link", name="Joint motion control")
+    expect(card).to_be_visible()
+    picture = card.locator("img")
+    assert picture.evaluate("img => img.decode().then(() => img.naturalWidth)") >= 400
+    screenshot(page, "home")
+    card.click()
+    expect(page).to_have_url(lambda url: "/labs/joint-control" in url)
+    expect(page.get_by_role("heading", level=1)).to_have_text("Joint motion control")
+
+
+def test_search_filters_by_word_as_one_types(page: Page) -> None:
+    page.goto("/")
+    page.keyboard.press("/")
+    page.keyboard.type("payload")
+    expect(page.get_by_role("link", name="Joint motion control")).to_be_visible()
+    expect(page.get_by_role("link", name="Oscillator")).to_be_hidden()
+    page.keyboard.press("Control+A")
+    page.keyboard.type("xyzzy")
+    expect(page.get_by_role("link", name="Joint motion control")).to_be_hidden()
+
+
+def test_an_unknown_lab_is_told_kindly(page: Page) -> None:
+    answer = page.goto("/labs/no-such-lab")
+    assert answer is not None
+    assert answer.status == 404
+    expect(page.get_by_role("link", name="Joint motion control")).to_be_visible()

@@ -1,0 +1,192 @@
+"""A lab's page in a browser: see, drag, press, share, export."""
+
+import csv
+import re
+from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page, expect
+
+from tests.browser.conftest import screenshot
+from tests.browser.lab_page import LabPage
+from tests.served import Served
+
+
+def test_the_robot_is_seen_and_moves(page: Page) -> None:
+    lab = LabPage(page).open("joint-control")
+    page.wait_for_timeout(4000)  # the meshes arrive and are drawn
+    first = lab.pixels("#robot")
+    page.wait_for_timeout(800)
+    second = lab.pixels("#robot")
+    height, width, _ = first.shape
+    middle = (slice(height // 5, height), slice(width // 6, width * 2 // 3))
+    assert first[middle].std() > 10, "there is a robot, not an empty scene"
+    assert (np.abs(first[middle] - second[middle]).max(axis=2) > 40).mean() > 0.002, "it moves"
+    screenshot(page, "lab")
+
+
+def test_time_and_plots_run_and_pause(page: Page) -> None:
+    lab = LabPage(page).open("joint-control")
+    plot = "#plots canvas >> nth=0"
+    before, t = lab.pixels(plot), lab.time()
+    expect(page.locator("#clock span")).not_to_have_text(f"{t:.2f}")
+    page.wait_for_timeout(1000)
+    assert (lab.pixels(plot) != before).any(), "the curves grow"
+    page.keyboard.press("Space")
+    expect(page.locator("#run")).to_have_text(re.compile("Run"))
+    page.wait_for_timeout(500)
+    still, t = lab.pixels(plot), lab.time()
+    page.wait_for_timeout(500)
+    assert lab.time() == t
+    assert (lab.pixels(plot) == still).all(), "the curves stand"
+    page.keyboard.press(".")
+    expect(page.locator("#clock span")).to_have_text(f"{t + 0.01:.2f}")
+
+
+def test_a_number_in_the_panel_changes_everything(page: Page) -> None:
+    lab = LabPage(page).open("joint-control")
+    box = lab.row("k_p").get_by_role("textbox")
+    box.fill("750")
+    box.press("Enter")
+    expect(lab.value("kp")).to_have_value("750")
+    expect(page).to_have_url(re.compile(r"[?&]kp=750\b"))
+    assert lab.status()["params"]["kp"] == 750
+
+
+def test_dragging_a_slider_changes_the_motion(page: Page) -> None:
+    lab = LabPage(page).open("joint-control", "?controller=pid&kp=1000&reference=set-point")
+    thumb = lab.row("N·m/rad").locator(".multi-slider-thumb").bounding_box()
+    assert thumb
+    page.mouse.move(thumb["x"] + thumb["width"] / 2, thumb["y"] + thumb["height"] / 2)
+    page.mouse.down()
+    for k in range(1, 9):
+        page.mouse.move(thumb["x"] - 8 * k, thumb["y"] + thumb["height"] / 2)
+        page.wait_for_timeout(60)
+    page.mouse.up()
+    expect(lab.value("kp")).not_to_have_value("1000")
+    kp = float(lab.value("kp").input_value())
+    assert 0 < kp < 400
+    # A softer spring sags more under the same weight: e = g / k_p.
+    page.wait_for_timeout(2500)
+    error = page.locator("#tiles").inner_text()
+    found = re.search(r"Steady-state.*?\n([\d.]+)", error, re.DOTALL)
+    assert found
+    assert float(found[1]) > 0.05
+
+
+def test_the_table_sets_values_and_refuses_wrong_ones(page: Page) -> None:
+    lab = LabPage(page).open("joint-control")
+    lab.value("kp").fill("99999")
+    lab.value("kp").press("Enter")
+    wrong = page.locator("#param-kp .wrong")
+    expect(wrong).to_contain_text("kp takes a number from 0 to 2000")
+    assert lab.status()["params"]["kp"] == 200
+    lab.value("kp").fill("300")
+    lab.value("kp").press("Enter")
+    expect(page).to_have_url(re.compile("kp=300"))
+    # The change arrives in the scene's panel too.
+    expect(lab.row("k_p").get_by_role("textbox")).to_have_value("300")
+
+
+def test_an_experiment_asks_sets_and_tells(page: Page) -> None:
+    lab = LabPage(page).open("joint-control")
+    experiment = page.locator(".experiment").first
+    expect(experiment).to_contain_text("?")
+    experiment.get_by_role("button").first.click()
+    expect(page).to_have_url(re.compile(r"\?.*controller="))
+    shown = {name: values[0] for name, values in parse_qs(urlsplit(page.url).query).items()}
+    params = lab.status()["params"]
+    assert {name: str(params[name]) for name in shown} == shown, "the address tells the settings"
+    expect(experiment.locator("details")).to_have_attribute("open", "")
+    screenshot(page, "experiment")
+
+
+def test_a_shared_link_shows_the_same(page: Page, chromium: Browser, served: Served) -> None:
+    lab = LabPage(page).open("joint-control", "?seed=3")
+    lab.value("kp").fill("420")
+    lab.value("kp").press("Enter")
+    expect(page).to_have_url(re.compile("kp=420"))
+    other = chromium.new_context(base_url=served.address)
+    try:
+        second = LabPage(other.new_page())
+        second.page.goto(page.url)
+        second.wait_live()
+        expect(second.value("kp")).to_have_value("420")
+        assert second.status()["params"] == lab.status()["params"]
+        assert second.status()["seed"] == 3
+    finally:
+        other.close()
+
+
+def test_a_wrong_link_says_so_and_starts(page: Page) -> None:
+    lab = LabPage(page).open("joint-control", "?kp=1e9")
+    expect(page.locator("body")).to_contain_text("kp takes a number from 0 to 2000")
+    expect(lab.value("kp")).to_have_value("200")
+
+
+@pytest.mark.parametrize("form", ["csv", "json", "npz"])
+def test_the_run_can_be_taken_home(page: Page, tmp_path: Path, form: str) -> None:
+    LabPage(page).open("joint-control")
+    page.wait_for_timeout(700)
+    page.get_by_role("button", name="Export").click()
+    with page.expect_download() as download:
+        page.locator(f"[data-export={form}]").click()
+    path = tmp_path / download.value.suggested_filename
+    download.value.save_as(path)
+    assert path.name.endswith(form)
+    if form == "csv":
+        lines = path.read_text().splitlines()
+        assert len(list(csv.reader(lines[1:]))) > 40
+    assert path.stat().st_size > 10_000
+
+
+def test_the_command_that_reproduces_is_copied(page: Page, context: BrowserContext) -> None:
+    context.grant_permissions(["clipboard-read", "clipboard-write"])
+    LabPage(page).open("joint-control", "?kp=333")
+    page.get_by_role("button", name="Export").click()
+    page.locator("[data-do=command]").click()
+    page.wait_for_timeout(500)
+    text = page.evaluate("navigator.clipboard.readText()")
+    assert text.startswith("orclab run joint-control")
+    assert "kp=333" in text
+
+
+def test_everything_goes_by_keyboard(page: Page) -> None:
+    lab = LabPage(page).open("joint-control", "?kp=500")
+    page.keyboard.press("?")
+    expect(page.get_by_role("dialog")).to_be_visible()
+    page.keyboard.press("Escape")
+    expect(page.get_by_role("dialog")).to_be_hidden()
+    page.wait_for_timeout(600)
+    page.keyboard.press("r")
+    expect(page.locator("#clock span")).to_have_text(re.compile(r"^0\.[0-4]"))
+    page.keyboard.press("d")
+    expect(lab.value("kp")).to_have_value("200")
+    page.keyboard.press("1")
+    expect(lab.value("kp")).to_be_visible()
+    expect(page).to_have_url(re.compile("controller="))
+    page.keyboard.press("+")
+    expect(page.locator("#speed-value")).to_have_text("2×")
+
+
+def test_divergence_is_explained_and_reset_recovers(page: Page) -> None:
+    lab = LabPage(page).open("joint-control", "?integrator=explicit-euler&step=0.01&kd=0&kp=2000")
+    banner = page.locator("#banner")
+    expect(banner).to_be_visible()
+    expect(banner).to_contain_text(re.compile(r"t = \d"))
+    screenshot(page, "trouble")
+    banner.get_by_role("button", name="Defaults").click()
+    expect(banner).to_be_hidden()
+    expect(lab.value("kp")).to_have_value("200")
+
+
+def test_every_kind_of_plot_draws(page: Page) -> None:
+    LabPage(page).open("oscillator")
+    for title in ("Position", "Phase", "Field", "Matrix", "Bars"):
+        expect(page.get_by_role("region", name=title)).to_be_visible()
+    page.get_by_role("region", name="Field").scroll_into_view_if_needed()
+    expect(page.locator("#plots .js-plotly-plot")).to_be_visible(timeout=20_000)
+    expect(page.locator("#plots table")).to_contain_text(re.compile(r"-?\d\.\d"))
+    screenshot(page, "plots")

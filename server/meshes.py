@@ -2,6 +2,7 @@
 worker forked from a process that has loaded them finds them in memory."""
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -30,7 +31,7 @@ def torus(radius: float, thickness: float) -> Triangles:
 
 @cache
 def _gltf(path: str, scale: tuple[float, float, float]) -> bytes:
-    scene = trimesh.load_scene(path)
+    scene: Any = trimesh.load_scene(path)  # its types are partial
     scene.apply_scale(scale)
     data = scene.export(file_type="glb")
     assert isinstance(data, bytes)
@@ -49,7 +50,7 @@ def _triangles(
         case Sphere(radius=radius):
             return _arrays(trimesh.creation.icosphere(3, radius))
         case None:
-            mesh = trimesh.load_mesh(path)
+            mesh: Any = trimesh.load_mesh(path)
             mesh.apply_scale(scale)
             return _arrays(mesh)
 

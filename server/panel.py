@@ -68,10 +68,10 @@ class Panel:
         return self._wire(slider, name)
 
     def _logarithmic(self, name: str, knob: Knob, value: float) -> Show:
-        number = self._gui.add_number(
+        number: Any = self._gui.add_number(
             knob.label, value, min=knob.low, max=knob.high, step=None, hint=_hint(knob)
         )
-        slider = self._gui.add_multi_slider(
+        slider: Any = self._gui.add_multi_slider(
             knob.unit or "log",
             0.0,
             1.0,
@@ -81,13 +81,13 @@ class Panel:
             hint=_hint(knob),
         )
 
-        @number.on_update
+        @number.on_update  # type: ignore[untyped-decorator]
         async def _(event: Any) -> None:
             if event.client_id is not None:
                 self._shown.pop(name, None)
                 self._send(name, float(number.value))
 
-        @slider.on_update
+        @slider.on_update  # type: ignore[untyped-decorator]
         async def _(event: Any) -> None:
             if event.client_id is not None:
                 self._shown.pop(name, None)
@@ -122,7 +122,7 @@ class Panel:
         write: Callable[[Any], Any] = lambda value: value,
     ) -> Show:
         # Asynchronous callbacks run in order on Viser's event loop; plain ones do not.
-        @control.on_update
+        @control.on_update  # type: ignore[untyped-decorator]
         async def _(event: Any) -> None:
             if event.client_id is not None:
                 self._shown[name] = read(control.value)

@@ -123,7 +123,7 @@ class ViserScene:
         def make() -> _Node:
             return _Node(
                 self._server.scene.add_line_segments(
-                    f"/{name}", segments, COLORS[color], line_width=2.5
+                    f"/{name}", segments, COLORS[color], thickness=2.5
                 )
             )
 
@@ -220,7 +220,7 @@ class _Node:
             self._handle.position = position
 
     def send(self, prop: str, value: Any) -> None:
-        if not np.array_equal(self._sent.get(prop), value):
+        if prop not in self._sent or not np.array_equal(self._sent[prop], value):
             self._sent[prop] = value
             setattr(self._handle, prop, value)
 
@@ -298,7 +298,9 @@ class _ArmNode(_Node):
         if ghost:
             center = vertices.mean(axis=0)
             vertices = center + GHOST_SCALE * (vertices - center)
-        color = COLORS["reference"] if ghost else tuple(round(255 * c) for c in piece.color)
+        color = (
+            COLORS["reference"] if ghost else np.round(255 * np.array(piece.color)).astype(np.uint8)
+        )
         self._scene.add_mesh_simple(
             path,
             vertices,

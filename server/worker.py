@@ -345,7 +345,7 @@ def _wait_for_opening(link: Link, mailbox: Mailbox) -> dict[str, Any]:
 def _viser() -> viser.ViserServer:
     """A Viser server on a free loopback port that no web page can reach past the proxy: browsers
     always send an Origin, the proxy never does."""
-    websockets.asyncio.server.serve = functools.partial(  # type: ignore[misc]
+    websockets.asyncio.server.serve = functools.partial(  # type: ignore[assignment,misc]
         websockets.asyncio.server.serve, origins=[None]
     )
     with Path(os.devnull).open("w") as silence, contextlib.redirect_stdout(silence):

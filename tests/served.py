@@ -12,7 +12,8 @@ from typing import Any, Self
 
 import httpx
 import psutil
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import connect
+from websockets.sync.connection import Connection
 
 
 class Served:
@@ -113,7 +114,7 @@ class Opened:
 class Stream:
     """A session's stream, read message by message."""
 
-    def __init__(self, socket: ClientConnection) -> None:
+    def __init__(self, socket: Connection) -> None:
         self.socket = socket
 
     def next(self, type: str, when: Callable[[dict[str, Any]], bool] = lambda m: True) -> Any:

@@ -2,11 +2,12 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
 from labs.lab import Action, Inputs, Lab, Measurement, Snapshot, State
-from labs.params import Params, choice, knob, toggle
+from labs.params import Params, Value, choice, knob, toggle
 from labs.plots import Bars, Curve, HeatMap, Line, Matrix, Readout, TimeSeries
 from labs.scene import Scene
 
@@ -49,7 +50,7 @@ class Oscillator(Lab[OscillatorParams, OscillatorState]):
         Readout("root", "Root", ""),
         Readout("late", "Late", "s"),
     )
-    presets: Mapping[str, Mapping[str, float | str | bool]] = {"Fast": {"omega": 8.0}}
+    presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {"Fast": {"omega": 8.0}}
     actions = (Action("kick", "Kick", "Kicks it."),)
 
     def init(self, params: OscillatorParams, rng: np.random.Generator) -> OscillatorState:
@@ -82,10 +83,16 @@ class Oscillator(Lab[OscillatorParams, OscillatorState]):
         return replace(state, root=snapshot.data["root"])
 
     def measure(self, params: OscillatorParams, state: OscillatorState) -> Measurement:
-        late = {"late": state.t} if state.t > 0.5 else {}
-        both = np.array([state.x, -state.x])
-        channels = {"x": state.x, "both": both, "root": state.root, "kicks": float(state.kicks)}
-        return {**channels, "pulled": state.pulled, **late}
+        measured: dict[str, float | np.ndarray] = {
+            "x": state.x,
+            "both": np.array([state.x, -state.x]),
+            "root": state.root,
+            "kicks": float(state.kicks),
+            "pulled": state.pulled,
+        }
+        if state.t > 0.5:
+            measured["late"] = state.t
+        return measured
 
     def fields(self, params: OscillatorParams, state: OscillatorState) -> Mapping[str, np.ndarray]:
         angle = np.linspace(0, 2 * np.pi, 40)

@@ -217,8 +217,8 @@ def test_a_guessed_id_finds_nothing(served: Served) -> None:
         ("GET", "/api/sessions/guess/command"),
         ("GET", "/scene/guess/"),
     ):
-        body = {"json": {}} if method == "PATCH" else {}
-        assert served.http.request(method, path, **body).status_code == 404, path
+        body: dict[str, float] | None = {} if method == "PATCH" else None
+        assert served.http.request(method, path, json=body).status_code == 404, path
 
 
 def test_unknown_export_forms_are_refused(served: Served) -> None:

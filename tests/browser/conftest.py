@@ -2,15 +2,17 @@
 
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
 from tests.served import Served
 
 SCREENSHOTS = Path("screenshots")
+Visit = Callable[..., BrowserContext]
 # Mesa's software rendering through EGL: two to three times faster than the browser's own.
 ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=gl-egl", "--ignore-gpu-blocklist"]
 
@@ -35,13 +37,24 @@ def chromium() -> Iterator[Browser]:
 
 
 @pytest.fixture
-def context(chromium: Browser, served: Served) -> Iterator[BrowserContext]:
-    context = chromium.new_context(
-        base_url=served.address, viewport={"width": 1440, "height": 900}, accept_downloads=True
-    )
-    context.set_default_timeout(30_000)
-    yield context
-    context.close()
+def visit(chromium: Browser) -> Iterator[Visit]:
+    """Makes browser contexts; all are closed at the end, whatever happened."""
+    opened: list[BrowserContext] = []
+
+    def make(server: Served, **options: Any) -> BrowserContext:
+        options = {"viewport": {"width": 1280, "height": 800}} | options
+        opened.append(chromium.new_context(base_url=server.address, **options))
+        return opened[-1]
+
+    expect.set_options(timeout=15_000)
+    yield make
+    for context in opened:
+        context.close()
+
+
+@pytest.fixture
+def context(visit: Visit, served: Served) -> BrowserContext:
+    return visit(served, accept_downloads=True)
 
 
 @pytest.fixture

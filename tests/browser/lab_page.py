@@ -44,8 +44,8 @@ class LabPage:
 
     def status(self) -> dict[str, Any]:
         """The session as the API tells it."""
-        source = self.page.locator("#robot").get_attribute("src") or ""
-        found = re.search(r"/scene/([^/]+)/", source)
+        addresses = " ".join(frame.url for frame in self.page.frames)
+        found = re.search(r"/scene/([^/]+)/", addresses)
         assert found
         answer = self.page.request.get(f"/api/sessions/{found[1]}")
         status: dict[str, Any] = json.loads(answer.text())

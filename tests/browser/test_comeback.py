@@ -4,9 +4,9 @@ import os
 import re
 import signal
 
-from playwright.sync_api import Browser, Page, expect
+from playwright.sync_api import Page, expect
 
-from tests.browser.conftest import screenshot
+from tests.browser.conftest import Visit, screenshot
 from tests.browser.lab_page import LabPage
 from tests.served import Served, until
 
@@ -30,9 +30,9 @@ def test_a_killed_worker_comes_back_with_the_same_parameters(page: Page, served:
     expect(lab.value("kp")).to_have_value("650")
 
 
-def test_a_restarted_server_is_found_again(chromium: Browser) -> None:
+def test_a_restarted_server_is_found_again(visit: Visit) -> None:
     with Served() as server:
-        context = chromium.new_context(base_url=server.address)
+        context = visit(server)
         lab = LabPage(context.new_page()).open("joint-control", "?kp=512")
         old = lab.status()["id"]
         server.stop()
@@ -43,26 +43,23 @@ def test_a_restarted_server_is_found_again(chromium: Browser) -> None:
         expect(lab.page.locator("body")).to_contain_text("your parameters")
         expect(lab.value("kp")).to_have_value("512")
         assert lab.status()["id"] != old
-        context.close()
 
 
-def test_a_full_house_says_so_and_lets_in_when_there_is_room(chromium: Browser) -> None:
+def test_a_full_house_says_so_and_lets_in_when_there_is_room(visit: Visit) -> None:
     with Served(ORCLAB_MAX_SESSIONS="1") as server:
-        context = chromium.new_context(base_url=server.address)
+        context = visit(server)
         with server.session("oscillator"):
             page = context.new_page()
             page.goto("/labs/joint-control")
             expect(page.locator("body")).to_contain_text("all 1 places are taken")
             screenshot(page, "full")
-        retry = page.get_by_role("button", name=re.compile("again|retry", re.IGNORECASE))
-        retry.first.click()
+        page.locator("#banner button").first.click()
         LabPage(page).wait_live()
-        context.close()
 
 
-def test_an_idle_session_rests_until_it_is_wanted(chromium: Browser) -> None:
+def test_an_idle_session_rests_until_it_is_wanted(visit: Visit) -> None:
     with Served(ORCLAB_UNTOUCHED_SECONDS="4") as server:
-        context = chromium.new_context(base_url=server.address)
+        context = visit(server)
         lab = LabPage(context.new_page()).open("joint-control", "?kp=512")
         expect(lab.page.locator("#banner")).to_contain_text("same parameters")
         until(lambda: server.health()["sessions"] == 0)
@@ -71,7 +68,6 @@ def test_an_idle_session_rests_until_it_is_wanted(chromium: Browser) -> None:
         lab.page.locator("#banner button").first.click()
         lab.wait_live()
         expect(lab.value("kp")).to_have_value("512")
-        context.close()
 
 
 def test_a_closed_page_frees_its_place(page: Page, served: Served) -> None:

@@ -1,0 +1,85 @@
+"""Renders the pictures the project shows of itself, from the real scene:
+`python -m tests.pictures LAB [name=value ...] [--seconds T]` makes the lab's card (NAME.webp beside
+its article); with `--page`, docs/LAB.webp of its page."""
+
+import argparse
+import io
+import shutil
+from pathlib import Path
+from urllib.parse import urlencode
+
+from PIL import Image
+from playwright.sync_api import Page, sync_playwright
+
+from labs.catalog import find
+from tests.served import Served
+
+ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=gl-egl", "--ignore-gpu-blocklist"]
+CARD, PANEL = (640, 400), 262
+"""[px] size of a card's picture; width of the panel beside the scene."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m tests.pictures", description=__doc__)
+    parser.add_argument("lab")
+    parser.add_argument("params", nargs="*", metavar="name=value")
+    parser.add_argument("--seconds", type=float, default=3.0, help="simulated time shown")
+    parser.add_argument("--page", action="store_true", help="the whole page, for the README")
+    options = parser.parse_args()
+    query = dict(text.split("=", 1) for text in options.params)
+    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    with Served() as server, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
+        page = browser.new_page(viewport={"width": 1440, "height": 900})
+        page.add_init_script("localStorage.setItem('graphics', 'high')")
+        page.goto(f"{server.address}/labs/{options.lab}?{urlencode(query)}")
+        page.wait_for_selector("#curtain.open", state="attached", timeout=60_000)
+        page.wait_for_timeout(20_000)  # software rendering takes its time over the first meshes
+        _run_to(page, options.seconds)
+        if options.page:
+            target = Path("docs") / f"{options.lab}.webp"
+            image = _shot(page).resize((1152, 720), Image.Resampling.LANCZOS)
+        else:
+            target = _beside_article(options.lab)
+            page.evaluate("document.querySelector('#robot').requestFullscreen()")
+            page.wait_for_timeout(8000)
+            image = _card(_shot(page))
+        image.save(target, quality=82, method=6)
+        print(f"{target}: {target.stat().st_size / 1024:.0f} KB")
+        browser.close()
+
+
+def _run_to(page: Page, seconds: float) -> None:
+    """Starts anew and pauses once the clock shows this time."""
+    page.keyboard.press("r")
+    page.wait_for_function(
+        "s => { const t = parseFloat(document.querySelector('#clock span').textContent);"
+        " return t > s && t < s + 1; }",
+        arg=seconds,
+        timeout=60_000,
+    )
+    page.keyboard.press("Space")
+    page.wait_for_timeout(3000)
+
+
+def _shot(page: Page) -> Image.Image:
+    return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+
+
+def _card(shot: Image.Image) -> Image.Image:
+    """The middle of the scene without its panel, in a card's proportions."""
+    width, height = shot.width - PANEL, shot.height
+    scale = min(width / CARD[0], height / CARD[1]) * 0.8
+    w, h = CARD[0] * scale, CARD[1] * scale
+    left, top = (width - w) / 2, (height - h) / 2
+    box = tuple(round(edge) for edge in (left, top, left + w, top + h))
+    return shot.crop(box).resize(CARD, Image.Resampling.LANCZOS)
+
+
+def _beside_article(slug: str) -> Path:
+    entry = find(slug)
+    return Path(*entry.package.split(".")) / f"{slug.replace('-', '_')}.webp"
+
+
+if __name__ == "__main__":
+    main()

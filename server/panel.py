@@ -71,12 +71,12 @@ class Panel:
         number: Any = self._gui.add_number(
             knob.label, value, min=knob.low, max=knob.high, step=None, hint=_hint(knob)
         )
-        slider: Any = self._gui.add_multi_slider(
+        slider: Any = self._gui.add_slider(
             knob.unit or "log",
             0.0,
             1.0,
             1 / TICKS,
-            (_tick(knob, value),),
+            _tick(knob, value),
             marks=tuple((_tick(knob, mark), f"{mark:g}") for mark in _decades(knob)),
             hint=_hint(knob),
         )
@@ -91,13 +91,13 @@ class Panel:
         async def _(event: Any) -> None:
             if event.client_id is not None:
                 self._shown.pop(name, None)
-                self._send(name, knob.at(slider.value[0]))
+                self._send(name, knob.at(slider.value))
 
         def show(value: Value) -> None:
             number.value = float(value)
             # A slider already within a tick is left alone: the hand may still be on it.
-            if abs(slider.value[0] - knob.position(float(value))) > 1.5 / TICKS:
-                slider.value = (_tick(knob, float(value)),)
+            if abs(slider.value - knob.position(float(value))) > 1.5 / TICKS:
+                slider.value = _tick(knob, float(value))
 
         return show
 
@@ -158,8 +158,9 @@ def _tick(knob: Knob, value: float) -> float:
 
 
 def _decades(knob: Knob) -> list[float]:
-    """The ends, and the powers of ten between them that leave room for their digits."""
+    """The ends, and the powers of ten between them that leave room for their digits; where there
+    are none, the middle."""
     top = math.floor(math.log10(knob.high) - 0.3)
     marks = [10.0**k for k in range(top, top - 12, -1)]
     inner = [m for m in marks if m > knob.low and 0.15 < knob.position(m) < 0.85]
-    return [knob.low, *inner, knob.high]
+    return [knob.low, *(inner or [knob.at(0.5)]), knob.high]

@@ -21,15 +21,17 @@ from server.sessions import NoSession, Sessions
 router = APIRouter(include_in_schema=False)
 
 GONE, TRY_AGAIN = 4404, 1013
+STYLE = b'<link rel="stylesheet" href="/static/css/scene.css">'
 
 
 @cache
 def viser_page() -> tuple[bytes, bytes]:
-    """Viser's client, one HTML file: as it is, and compressed."""
+    """Viser's client, one HTML file, with our style: plain, and compressed."""
     spec = find_spec("viser")
     assert spec is not None
     assert spec.origin is not None
     page = (Path(spec.origin).parent / "client" / "build" / "index.html").read_bytes()
+    page = page.replace(b"</head>", STYLE + b"</head>", 1)
     return page, gzip.compress(page)
 
 

@@ -123,7 +123,7 @@ class ViserScene:
         def make() -> _Node:
             return _Node(
                 self._server.scene.add_line_segments(
-                    f"/{name}", segments, COLORS[color], thickness=2.5
+                    f"/{name}", segments, COLORS[color], thickness=2.5, thickness_units="screen"
                 )
             )
 

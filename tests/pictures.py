@@ -72,7 +72,7 @@ def _card(shot: Image.Image) -> Image.Image:
     scale = min(width / CARD[0], height / CARD[1]) * 0.8
     w, h = CARD[0] * scale, CARD[1] * scale
     left, top = (width - w) / 2, (height - h) / 2
-    box = tuple(round(edge) for edge in (left, top, left + w, top + h))
+    box = (left, top, left + w, top + h)
     return shot.crop(box).resize(CARD, Image.Resampling.LANCZOS)
 
 

@@ -33,7 +33,7 @@ class LabPage:
         """The row of the panel with this label: Viser associates no label with its slider."""
         text = self.scene.get_by_text(label, exact=True)
         expect(text).to_be_visible()
-        return text.locator("xpath=ancestor::*[.//input or .//*[contains(@class, '-thumb')]][1]")
+        return text.locator("xpath=ancestor::*[.//input or .//*[@role='slider']][1]")
 
     def time(self) -> float:
         return float(self.page.locator("#clock span").inner_text())

@@ -61,7 +61,9 @@ def test_a_number_in_the_panel_changes_everything(page: Page) -> None:
 
 def test_dragging_a_slider_changes_the_motion(page: Page) -> None:
     lab = LabPage(page).open("joint-control", "?controller=pid&kp=1000&reference=set-point")
-    thumb = lab.row("N·m/rad").locator(".multi-slider-thumb").bounding_box()
+    handle = lab.row("N·m/rad").get_by_role("slider")
+    handle.scroll_into_view_if_needed()
+    thumb = handle.bounding_box()
     assert thumb
     page.mouse.move(thumb["x"] + thumb["width"] / 2, thumb["y"] + thumb["height"] / 2)
     page.mouse.down()

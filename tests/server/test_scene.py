@@ -47,8 +47,8 @@ def test_a_logarithmic_slider_and_its_number_agree(served: Served) -> None:
     ):
         scene.set("k_p", 1000.0)
         stream.next("status", lambda s: s["params"]["gain"] == 1000.0)
-        scene.shows("1/s", [1.0])
-        scene.set("1/s", [0.0])
+        scene.shows("1/s", 1.0)
+        scene.set("1/s", 0.0)
         stream.next("status", lambda s: s["params"]["gain"] == 0.0)
         scene.shows("k_p", 0.0)
 

@@ -83,9 +83,11 @@ class ViserScene:
         if not self._server.get_clients() and self._frame:
             return  # Nobody looks; the first frame is drawn for whoever comes.
         self._drawn.clear()
-        world.lab.draw(self, world.params, world.state)
-        for name, node in self._nodes.items():
-            node.show(name in self._drawn)
+        # One window a frame: what moves together arrives together, and Viser's loop wakes once.
+        with self._server.atomic():
+            world.lab.draw(self, world.params, world.state)
+            for name, node in self._nodes.items():
+                node.show(name in self._drawn)
         self._frame += 1
 
     # What a lab draws -----------------------------------------------------------------------
@@ -253,15 +255,16 @@ class _ArmNode(_Node):
     def move(self, q: np.ndarray) -> None:
         """Places every joint that moved in its parent's frame."""
         pin.forwardKinematics(self._model, self._data, q)
-        for joint, handle in enumerate(self._joints):
-            pose = pin.SE3ToXYZQUAT(self._data.liMi[joint + 1])
-            last = self._poses[joint]
-            if not np.abs(pose[3:] - last[3:]).max() < STILL:
-                handle.wxyz = pose[[6, 3, 4, 5]]
-                last[3:] = pose[3:]
-            if not np.abs(pose[:3] - last[:3]).max() < STILL:
-                handle.position = pose[:3]
-                last[:3] = pose[:3]
+        in_parent = self._data.liMi
+        poses = np.array([pin.SE3ToXYZQUAT(in_parent[j]) for j in range(1, self._model.njoints)])
+        # Not "moved by more": the first poses are compared with NaN.
+        still = np.abs(poses - self._poses) < STILL
+        for joint in np.flatnonzero(~still[:, 3:].all(axis=1)):
+            self._joints[joint].wxyz = poses[joint, [6, 3, 4, 5]]
+            self._poses[joint, 3:] = poses[joint, 3:]
+        for joint in np.flatnonzero(~still[:, :3].all(axis=1)):
+            self._joints[joint].position = poses[joint, :3]
+            self._poses[joint, :3] = poses[joint, :3]
 
     def rings(self, effort: np.ndarray) -> None:
         """A ring on every joint near its torque limit: amber from 0.8, red at the limit."""

@@ -33,7 +33,9 @@ from server.pipe import CONTROL, HELLO, STATUS, STREAM, Link
 from server.viser_scene import ViserScene
 
 FRAME = 1 / 60
-"""[s] The loop's beat, and the scene's."""
+"""[s] The loop's beat, and the scene's; on a machine that is late, the scene's is twice that."""
+LATE = 0.001
+"""[s] Waking up later than this, on average, means that the machine is busy."""
 TELEMETRY = 1 / 30
 FIELDS = 1 / 5
 STATUS_EVERY = 0.5
@@ -79,15 +81,17 @@ class Live:
         self._due = dict.fromkeys(("scene", "telemetry", "fields", "status"), 0.0)
         self._pace: deque[tuple[float, float]] = deque(maxlen=4)
         self._urgent = False
+        self._lateness = 0.0
         self._anchor()
 
     def loop(self) -> None:
         """Mail, world, solver, viewers; for ever. Any other order would show a stale state."""
         while True:
-            now = time.perf_counter()
-            for item in self.mailbox.take(self._next_wake(now) - now):
+            wake = self._next_wake(time.perf_counter())
+            for item in self.mailbox.take(wake - time.perf_counter()):
                 self._obey(item)
             now = time.perf_counter()
+            self._lateness += 0.02 * (max(0.0, now - wake) - self._lateness)
             with self._guard():
                 self._advance(now)
                 self._iterate(now)
@@ -249,7 +253,8 @@ class Live:
             with self._guard():
                 self._telemetry(now)
             self._urgent = False
-        if self._beat("scene", now, FRAME) and not self.failure:
+        frame = FRAME if self._lateness < LATE else 2 * FRAME
+        if self._beat("scene", now, frame) and not self.failure:
             with self._guard():
                 self.scene.draw(self.world)
         if self._beat("status", now, STATUS_EVERY):

@@ -87,6 +87,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         version=versions()["orclab"],
         summary="An interactive lab for optimization-based robot control.",
         lifespan=lifespan,
+        docs_url=None,  # its pages load scripts from elsewhere; ours does not
+        redoc_url=None,
     )
     app.add_middleware(Guard, settings=settings)
     app.include_router(api)
@@ -261,6 +263,8 @@ async def _not_valid(_: Request, error: Exception) -> Response:
 
 async def _http_error(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
+    if error.status_code == 404 and "text/html" in request.headers.get("accept", ""):
+        return pages.missing(request, "There is nothing at this address")
     sentence = f"{request.method} {request.url.path[:200]}: {error.detail}"
     return _problem(error.status_code, sentence, "http", error.headers)
 

@@ -27,6 +27,13 @@ VENDOR = {
     "uplot.js": ("uplot", "uplot-python", "static/uPlot.iife.js", "text/javascript"),
     "uplot.css": ("uplot", "uplot-python", "static/uPlot.min.css", "text/css"),
     "plotly.js": ("plotly", "plotly", "package_data/plotly.min.js", "text/javascript"),
+    "swagger.js": (
+        "fastapi_offline",
+        "fastapi-offline",
+        "static/swagger-ui-bundle.js",
+        "text/javascript",
+    ),
+    "swagger.css": ("fastapi_offline", "fastapi-offline", "static/swagger-ui.css", "text/css"),
     "stix.ttf": ("ziamath", "ziamath", "fonts/STIXTwoMath-Regular.ttf", "font/ttf"),
 }
 
@@ -63,7 +70,7 @@ def home(request: Request) -> Response:
 def lab(request: Request, slug: str) -> Response:
     entry = catalog().get(slug)
     if entry is None:
-        return _page(request, "missing.html", 404, slug=slug, chapters=_chapters())
+        return missing(request, f"No lab is called “{slug}”")
     entries = list(catalog().values())
     place = entries.index(entry)
     return _page(
@@ -77,6 +84,16 @@ def lab(request: Request, slug: str) -> Response:
         before=entries[place - 1] if place > 0 else None,
         after=entries[place + 1] if place + 1 < len(entries) else None,
     )
+
+
+def missing(request: Request, what: str) -> Response:
+    """Says what was not found, and shows the labs there are."""
+    return _page(request, "missing.html", 404, what=what, chapters=_chapters())
+
+
+@router.get("/docs")
+def docs(request: Request) -> Response:
+    return _page(request, "docs.html")
 
 
 @router.get("/labs/{slug}/picture.webp")

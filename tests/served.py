@@ -61,7 +61,8 @@ class Served:
 
     def workers(self) -> list[psutil.Process]:
         """All processes below the server's, and theirs."""
-        return psutil.Process(self.process.pid).children(recursive=True)
+        below: list[psutil.Process] = psutil.Process(self.process.pid).children(recursive=True)
+        return below
 
     def listeners(self) -> dict[int, tuple[str, int]]:
         """Where each worker's Viser server listens, by process id."""

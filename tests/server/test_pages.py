@@ -20,7 +20,7 @@ OWN_FILES = sorted(p for p in STATIC.rglob("*") if p.suffix in {".js", ".css", "
 
 @pytest.fixture(scope="module")
 def client() -> Iterator[TestClient]:
-    app = FastAPI()
+    app = FastAPI(docs_url=None)
     install(app)
     with TestClient(app) as client:
         yield client
@@ -83,7 +83,7 @@ def test_an_unknown_lab_gets_a_page_that_lists_those_there_are(
         return
     assert answer.status_code == 404
     assert "text/html" in answer.headers["content-type"]
-    assert "no lab at this address" in answer.text
+    assert "No lab is called" in answer.text
     assert f'href="/labs/{LAB}"' in answer.text
 
 
@@ -180,3 +180,9 @@ def test_pictures_are_those_of_the_labs(client: TestClient) -> None:
         else:
             assert answer.content == entry.picture
             assert answer.headers["content-type"] == "image/webp"
+
+
+def test_the_api_is_described_without_the_network(client: TestClient) -> None:
+    html = client.get("/docs").text
+    assert vendor_url("swagger.js") in html
+    assert "://" not in re.sub(r"http://testserver\S*", "", html)

@@ -1,7 +1,7 @@
 """Tunables: declared once, they become a slider, a validated field, a CLI option and a link.
 
 A lab's parameters are a frozen pydantic model whose fields are made by `knob` (a number on a
-slider), `choice` (one of a few named values) or `toggle` (on or off).
+slider), `choice` (one of a few named values), `toggle` (on or off) or `text`.
 """
 
 import math
@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
 from pydantic_core.core_schema import ValidationInfo
 
 from labs.errors import ParameterError
@@ -21,6 +22,7 @@ Value = float | str | bool
 
 # A logarithmic slider that reaches zero bends to linear below high / LOG_SPAN.
 LOG_SPAN = 1000.0
+TEXT_LENGTH = 400
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,14 @@ class Toggle(Tunable):
     """On or off."""
 
 
+@dataclass(frozen=True)
+class Text(Tunable):
+    """A short text, such as the rows of a table. What it must say, the lab's model validates:
+    with a `field_validator` that raises ValueError, its message a sentence that helps."""
+
+    rows: int
+
+
 def knob(
     default: float,
     low: float,
@@ -137,6 +147,21 @@ def toggle(
 ) -> Any:
     """On or off."""
     return _field(default, Toggle(help, label, "", group, effect))
+
+
+def text(
+    default: str,
+    *,
+    help: str,
+    label: str,
+    symbol: str = "",
+    group: str = "",
+    rows: int = 1,
+    effect: Effect = "live",
+) -> Any:
+    """A text of at most TEXT_LENGTH characters, shown in `rows` lines."""
+    tunable = Text(help, label, symbol, group, effect, rows)
+    return _field(default, tunable, max_length=TEXT_LENGTH)
 
 
 def _field(default: Value, tunable: Tunable, **constraints: Any) -> Any:
@@ -184,9 +209,7 @@ class Params(BaseModel):
         try:
             return type(self).model_validate(self.model_dump() | dict(changes))
         except ValidationError as error:
-            raise ParameterError(
-                "; ".join(self._sentence(str(e["loc"][0]), e["input"]) for e in error.errors())
-            ) from None
+            raise ParameterError("; ".join(map(self._sentence, error.errors()))) from None
 
     def differing(self, other: Self) -> dict[str, Value]:
         """The values of these parameters that `other` does not share."""
@@ -205,20 +228,26 @@ class Params(BaseModel):
         return [tunable.describe(name, defaults[name]) for name, tunable in cls.tunables.items()]
 
     @classmethod
-    def _sentence(cls, name: str, given: object) -> str:
+    def _sentence(cls, error: ErrorDetails) -> str:
+        name = str(error["loc"][0])
         tunable = cls.tunables[name]
-        shown = f"{name} = {str(given)[:80]!s}"
+        shown = f"{name} = {str(error['input'])[:80]!s}"
         if isinstance(tunable, Knob):
             unit = f" {tunable.unit}" if tunable.unit else ""
             return f"{shown}: {name} takes a number from {tunable.low:g} to {tunable.high:g}{unit}"
         if isinstance(tunable, Choice):
             return f"{shown}: {name} takes one of {', '.join(map(str, tunable.options))}"
+        if isinstance(tunable, Text):
+            why = error["msg"].removeprefix("Value error, ")
+            return f"{shown}: {why}"
         return f"{shown}: {name} takes true or false"
 
 
 def _from_text(text: str, tunable: Tunable | None) -> object:
     if isinstance(tunable, Choice):
         return next((value for value in tunable.options if str(value) == text), _number(text))
+    if isinstance(tunable, Text):
+        return text
     if isinstance(tunable, Toggle):
         return {"true": True, "1": True, "on": True, "false": False, "0": False, "off": False}.get(
             text.lower(), text

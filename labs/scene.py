@@ -7,6 +7,7 @@ scene sends only what changed. `NullScene` is its twin for headless runs.
 from typing import Literal, Protocol
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from labs.models.arms import Arm
@@ -46,6 +47,30 @@ class Scene(Protocol):
         """A ball: center (3,) [m], radius [m]."""
         ...
 
+    def frame(self, name: str, placement: pin.SE3, length: float = 0.15) -> None:
+        """The axes of a frame in the world: x red, y green, z blue; `length` [m]."""
+        ...
+
+    def arc(
+        self,
+        name: str,
+        center: ArrayLike,
+        axis: ArrayLike,
+        angle: float,
+        radius: float,
+        color: Color = "force",
+    ) -> None:
+        """A circular arrow about `axis` through `center` (3,) [m], of `angle` [rad] in the
+        right-handed sense, within (-2 pi, 2 pi): a torque at a joint."""
+        ...
+
+    def ellipsoid(
+        self, name: str, center: ArrayLike, axes: np.ndarray, color: Color = "actual"
+    ) -> None:
+        """A translucent ellipsoid: the image of the unit ball under `axes` (3, 3) [m], moved to
+        `center` (3,) [m]."""
+        ...
+
     def handle(self, name: str, position: ArrayLike, radius: float = 0.05) -> None:
         """A ball at `position` (3,) [m] the user can drag. While it is held, its place is in
         `Inputs.handles[name]`."""
@@ -83,6 +108,25 @@ class NullScene:
         self.names.append(name)
 
     def sphere(self, name: str, center: ArrayLike, radius: float, color: Color = "actual") -> None:
+        self.names.append(name)
+
+    def frame(self, name: str, placement: pin.SE3, length: float = 0.15) -> None:
+        self.names.append(name)
+
+    def arc(
+        self,
+        name: str,
+        center: ArrayLike,
+        axis: ArrayLike,
+        angle: float,
+        radius: float,
+        color: Color = "force",
+    ) -> None:
+        self.names.append(name)
+
+    def ellipsoid(
+        self, name: str, center: ArrayLike, axes: np.ndarray, color: Color = "actual"
+    ) -> None:
         self.names.append(name)
 
     def handle(self, name: str, position: ArrayLike, radius: float = 0.05) -> None:

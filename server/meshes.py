@@ -30,6 +30,12 @@ def torus(radius: float, thickness: float) -> Triangles:
 
 
 @cache
+def ball() -> Triangles:
+    """A ball of radius 1."""
+    return _arrays(trimesh.creation.icosphere(3, 1.0))
+
+
+@cache
 def _gltf(path: str, scale: tuple[float, float, float]) -> bytes:
     scene: Any = trimesh.load_scene(path)  # its types are partial
     scene.apply_scale(scale)

@@ -10,7 +10,7 @@ from typing import Any
 import viser
 
 from labs.lab import Action
-from labs.params import Choice, Knob, Params, Tunable, Value
+from labs.params import Choice, Knob, Params, Text, Tunable, Value
 from labs.run import World
 from server.mailbox import Mailbox
 
@@ -56,6 +56,11 @@ class Panel:
                 return self._linear(name, tunable, float(value))
             case Choice():
                 return self._choice(name, tunable, value)
+            case Text():
+                field = self._gui.add_text(
+                    tunable.label, str(value), multiline=tunable.rows > 1, hint=tunable.help
+                )
+                return self._wire(field, name)
             case _:
                 box = self._gui.add_checkbox(tunable.label, bool(value), hint=tunable.help)
                 return self._wire(box, name)

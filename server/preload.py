@@ -16,5 +16,6 @@ for _name in ARMS:
     for _piece in (*_arm.collisions, *(p for p in _arm.visuals if not p.mesh)):
         meshes.triangles(_piece)
 meshes.torus(0.095, 0.009)
+meshes.ball()
 # What is loaded now is never collected: its pages stay shared among all workers.
 gc.freeze()

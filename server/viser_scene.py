@@ -156,6 +156,60 @@ class ViserScene:
 
         self._node(name, (radius, color), make).place(np.asarray(center))
 
+    def frame(self, name: str, placement: pin.SE3, length: float = 0.15) -> None:
+        def make() -> _Node:
+            return _Node(
+                self._server.scene.add_frame(
+                    f"/{name}", axes_length=length, axes_radius=0.04 * length, origin_radius=0.0
+                )
+            )
+
+        node = self._node(name, length, make)
+        node.place(placement.translation)
+        node.turn(pin.SE3ToXYZQUAT(placement)[[6, 3, 4, 5]])
+
+    def arc(
+        self,
+        name: str,
+        center: ArrayLike,
+        axis: ArrayLike,
+        angle: float,
+        radius: float,
+        color: Color = "force",
+    ) -> None:
+        segments = _arc_with_head(np.asarray(center), np.asarray(axis), angle, radius)
+
+        def make() -> _Node:
+            return _Node(
+                self._server.scene.add_line_segments(
+                    f"/{name}", segments, COLORS[color], thickness=4.0, thickness_units="screen"
+                )
+            )
+
+        self._node(name, color, make).send("points", segments)
+
+    def ellipsoid(
+        self, name: str, center: ArrayLike, axes: np.ndarray, color: Color = "actual"
+    ) -> None:
+        vertices, faces = meshes.ball()
+
+        def make() -> _Node:
+            return _Node(
+                self._server.scene.add_mesh_simple(
+                    f"/{name}",
+                    vertices @ axes.T,
+                    faces,
+                    color=COLORS[color],
+                    opacity=0.3,
+                    side="double",
+                    cast_shadow=False,
+                )
+            )
+
+        node = self._node(name, color, make)
+        node.send("vertices", (vertices @ axes.T).astype(np.float32))
+        node.place(np.asarray(center))
+
     def handle(self, name: str, position: ArrayLike, radius: float = 0.05) -> None:
         def make() -> _Node:
             ball = self._server.scene.add_icosphere(
@@ -209,6 +263,7 @@ class _Node:
         self._handle = handle
         self._visible = True
         self._position = np.full(3, np.nan)
+        self._wxyz = np.full(4, np.nan)
         self._sent: dict[str, Any] = {}
 
     def show(self, visible: bool) -> None:
@@ -220,6 +275,11 @@ class _Node:
         if not np.abs(position - self._position).max() < STILL:
             self._position = position.copy()
             self._handle.position = position
+
+    def turn(self, wxyz: np.ndarray) -> None:
+        if not np.abs(wxyz - self._wxyz).max() < STILL:
+            self._wxyz = wxyz.copy()
+            self._handle.wxyz = wxyz
 
     def send(self, prop: str, value: Any) -> None:
         if prop not in self._sent or not np.array_equal(self._sent[prop], value):
@@ -315,6 +375,20 @@ class _ArmNode(_Node):
             receive_shadow=not ghost,
             **place,
         )
+
+
+def _arc_with_head(center: np.ndarray, axis: np.ndarray, angle: float, radius: float) -> np.ndarray:
+    """Segments (k, 2, 3) of an arc about `axis`, with an arrow's head where it ends."""
+    axis = axis / np.linalg.norm(axis)
+    x = np.cross(axis, [0.0, 0.0, 1.0] if abs(axis[2]) < 0.9 else [1.0, 0.0, 0.0])
+    x /= np.linalg.norm(x)
+    y = np.cross(axis, x)
+    turns = np.linspace(0.0, angle, 25)
+    points = center + radius * (np.outer(np.cos(turns), x) + np.outer(np.sin(turns), y))
+    back = turns[-1] - np.sign(angle) * min(0.3, abs(angle) / 2)
+    barbs = [r * (np.cos(back) * x + np.sin(back) * y) for r in (0.85 * radius, 1.15 * radius)]
+    head = [[points[-1], center + barb] for barb in barbs]
+    return np.concatenate([np.stack([points[:-1], points[1:]], 1), head]).astype(np.float32)
 
 
 def _turn_z_to(axis: np.ndarray) -> np.ndarray:

@@ -248,11 +248,14 @@ class Live:
             self._sent_run, self._sent_rows = self.world.runs, 0
             self._urgent = True
             self._hello()
-        fresh = self.world.recorder.count > self._sent_rows
-        if self._beat("telemetry", now, TELEMETRY, at_once=self._urgent and fresh):
+        fresh = self.world.recorder.count > self._sent_rows or not self._moving
+        if self._urgent and fresh:
+            # What was changed shows now, not at the next beat.
+            self._due["telemetry"] = self._due["fields"] = self._due["scene"] = 0.0
+            self._urgent = False
+        if self._beat("telemetry", now, TELEMETRY):
             with self._guard():
                 self._telemetry(now)
-            self._urgent = False
         frame = FRAME if self._lateness < LATE else 2 * FRAME
         if self._beat("scene", now, frame) and not self.failure:
             with self._guard():
@@ -260,8 +263,8 @@ class Live:
         if self._beat("status", now, STATUS_EVERY):
             self._status(now)
 
-    def _beat(self, what: str, now: float, every: float, at_once: bool = False) -> bool:
-        if now < self._due[what] and not at_once:
+    def _beat(self, what: str, now: float, every: float) -> bool:
+        if now < self._due[what]:
             return False
         self._due[what] = max(self._due[what] + every, now + every / 2)
         return True

@@ -52,12 +52,14 @@ class HeatMap:
 
 @dataclass(frozen=True)
 class Matrix:
-    """A small 2-D field written out in digits."""
+    """A small 2-D field written out in digits. `shade` also colours each cell by its value
+    relative to the largest magnitude: a heat map one can read."""
 
     title: str
     field: str
     symbol: str
     unit: str = ""
+    shade: bool = False
 
 
 @dataclass(frozen=True)

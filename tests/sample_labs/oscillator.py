@@ -45,7 +45,7 @@ class Oscillator(Lab[OscillatorParams, OscillatorState]):
         TimeSeries("Position", "m", (Line("x", "x"), Line("both", "y", "dash")), select="part"),
         Curve("Phase", "angle", "wave", "angle [rad]", "wave"),
         HeatMap("Field", "angle", "angle", "field", "a [rad]", "b [rad]", "value"),
-        Matrix("Matrix", "matrix", "M"),
+        Matrix("Matrix", "matrix", "M", shade=True),
         Bars("Bars", "bars", "b", "m", "limits"),
         Readout("root", "Root", ""),
         Readout("late", "Late", "s"),

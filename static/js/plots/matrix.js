@@ -1,6 +1,7 @@
-// A small matrix in digits.
+// A small matrix in digits, its cells shaded by their values if asked for.
 
 import { card, element } from "./card.js";
+import { diverging } from "./palette.js";
 import { symbol } from "./symbol.js";
 
 export class Matrix {
@@ -8,14 +9,15 @@ export class Matrix {
     this.plot = plot;
     Object.assign(this, card(plot.title, plot.unit, "matrix"));
     if (plot.mathml) this.legend.append(symbol(plot.mathml));
-    this.table = this.body.appendChild(element("table"));
+    this.table = this.body.appendChild(element("table", plot.shade ? "shaded" : ""));
   }
 
   update(fields) {
     const rows = fields[this.plot.field];
     if (!rows) return;
     const cells = rows.map((row) => [row].flat());
-    const decimals = decimalsFor(cells.flat());
+    const largest = Math.max(...cells.flat().map((value) => Math.abs(value ?? 0)), 1e-9);
+    const decimals = decimalsFor(largest);
     if (this.table.rows.length !== cells.length || this.table.rows[0]?.cells.length !== cells[0].length) {
       this.table.replaceChildren(...cells.map((row) => {
         const made = element("tr");
@@ -27,6 +29,7 @@ export class Matrix {
       const text = digits(value, decimals);
       const cell = this.table.rows[i].cells[j];
       if (cell.textContent !== text) cell.textContent = text;
+      if (this.plot.shade) cell.style.backgroundColor = diverging((value ?? 0) / largest);
     }));
   }
 
@@ -34,8 +37,7 @@ export class Matrix {
 }
 
 // All entries have the same decimals, three digits of the largest: columns stand in line.
-function decimalsFor(values) {
-  const largest = Math.max(...values.map((value) => Math.abs(value ?? 0)), 1e-9);
+function decimalsFor(largest) {
   return Math.min(8, Math.max(0, 2 - Math.floor(Math.log10(largest))));
 }
 

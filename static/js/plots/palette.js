@@ -15,6 +15,14 @@ export function colour(name) {
   return cache.get(name);
 }
 
+// A diverging scale for a level in [-1, 1]: one tone for negative values, another for positive
+// ones, nothing at zero; pale enough that ink stays readable on it in light and dark.
+export function diverging(level) {
+  const share = Math.round(50 * Math.min(1, Math.abs(level)));
+  if (!share) return "transparent";
+  return `color-mix(in srgb, var(--${level < 0 ? "negative" : "positive"}) ${share}%, transparent)`;
+}
+
 export function forgetColours() {
   cache = new Map();
 }

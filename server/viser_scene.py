@@ -339,7 +339,9 @@ class _ArmNode(_Node):
                 handle.color = COLORS["warning"] if level == 2 else AMBER
 
     def _ring(self, joint: int) -> Any:
-        axis = np.reshape(self._model.joints[joint].createData().S, (6, -1))[3:, 0]
+        subspace = np.reshape(self._model.joints[joint].createData().S, (6, -1))[:, 0]
+        # About the axis a joint turns about; where it slides, around the direction it slides in.
+        axis = subspace[3:] if subspace[3:].any() else subspace[:3]
         vertices, faces = meshes.torus(0.095, 0.009)
         return self._scene.add_mesh_simple(
             f"{self._paths[joint]}/ring",

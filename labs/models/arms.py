@@ -1,4 +1,4 @@
-"""The arms: UR5, Panda and a double pendulum, as Pinocchio models with what draws them.
+"""The arms: UR5, Panda, a double pendulum and a SCARA, as Pinocchio models with what draws them.
 
 The equation of motion of each is M(q) q'' + h(q, q') = tau (notes, 1.2), SI units, world frame
 with z up, the floor at z = 0. The URDFs leave out what a gear adds to the inertia felt at a
@@ -70,9 +70,10 @@ class Arm:
     title: str
     model: pin.Model
     home: np.ndarray
-    """(nq,) [rad]: a bent posture, away from singularities and from the floor."""
+    """(nq,) [rad; m where a joint slides]: a bent posture, away from singularities and from the
+    floor."""
     torque_limit: np.ndarray
-    """(nv,) [N m]: what each motor can give, in either direction."""
+    """(nv,) [N m; N where a joint slides]: what each motor can give, in either direction."""
     tip: int
     """The end-effector, as the index of a frame of the model."""
     visuals: tuple[Visual, ...]
@@ -161,10 +162,66 @@ def double_pendulum() -> Arm:
     )
 
 
+@cache
+def scara() -> Arm:
+    """A SCARA arm, 4 joints: two that turn links of 0.4 m and 0.3 m in the horizontal plane, a
+    quill that slides along the vertical by 0.15 m either way, and its turn about the vertical.
+    All axes are the world's z. At q = 0 the arm is stretched along x. Uniform links; reflected
+    inertia of the order of small gear motors."""
+    dark, blue, orange = (0.3, 0.32, 0.36), (0.16, 0.42, 0.76), (0.88, 0.5, 0.16)
+    light = (0.78, 0.8, 0.83)
+    model = pin.Model()
+    model.name = "scara"
+    shoulder = model.addJoint(0, pin.JointModelRZ(), _shift(0.0, 0.0, 0.5), "shoulder")
+    elbow = model.addJoint(shoulder, pin.JointModelRZ(), _shift(0.4, 0.0, 0.09), "elbow")
+    quill = model.addJoint(elbow, pin.JointModelPZ(), _shift(0.3, 0.0, -0.1), "quill")
+    tool = model.addJoint(quill, pin.JointModelRZ(), _shift(0.0, 0.0, -0.16), "tool")
+    for joint in (shoulder, elbow, quill, tool):
+        model.addJointFrame(joint)
+    links = {shoulder: (5.0, 0.4), elbow: (3.5, 0.3)}
+    visuals = [
+        _primitive(0, _shift(0.0, 0.0, 0.01), Box((0.3, 0.3, 0.02)), dark),
+        _primitive(0, _shift(0.0, 0.0, 0.23), Cylinder(0.07, 0.46), light),
+    ]
+    for (joint, (mass, length)), color in zip(links.items(), (blue, orange), strict=True):
+        middle, size = _shift(length / 2, 0.0, 0.0), (length, 0.11, 0.08)
+        model.appendBodyToJoint(joint, pin.Inertia.FromBox(mass, *size), middle)
+        visuals += [
+            _primitive(joint, middle, Box(size), color),
+            _primitive(joint, pin.SE3.Identity(), Cylinder(0.075, 0.085), dark),
+        ]
+    model.appendBodyToJoint(quill, pin.Inertia.FromCylinder(1.0, 0.018, 0.45), _shift(0, 0, 0.06))
+    model.appendBodyToJoint(tool, pin.Inertia.FromBox(0.5, 0.1, 0.04, 0.03), _shift(0, 0, -0.03))
+    visuals += [
+        _primitive(elbow, _shift(0.3, 0.0, 0.0), Cylinder(0.06, 0.14), dark),
+        _primitive(quill, _shift(0.0, 0.0, 0.07), Cylinder(0.018, 0.46), light),
+        _primitive(tool, _shift(0.0, 0.0, -0.015), Cylinder(0.03, 0.03), dark),
+        _primitive(tool, _shift(0.0, 0.0, -0.04), Box((0.1, 0.03, 0.02)), blue),
+    ]
+    model.armature = np.array([0.3, 0.15, 5.0, 0.01])
+    model.lowerPositionLimit = np.array([-np.pi, -2.6, -0.15, -np.pi])
+    model.upperPositionLimit = -model.lowerPositionLimit
+    limit = np.array([100.0, 60.0, 150.0, 10.0])
+    model.effortLimit = limit.copy()
+    tip = model.addFrame(pin.Frame("tip", tool, _shift(0, 0, -0.05), pin.FrameType.OP_FRAME))
+    return Arm(
+        name="scara",
+        title="SCARA",
+        model=model,
+        home=np.array([-0.4, 1.2, 0.0, -0.8]),
+        torque_limit=limit,
+        tip=tip,
+        visuals=tuple(visuals),
+        collisions=tuple(visuals),
+        camera=((1.15, -0.95, 0.95), (0.2, 0.05, 0.36)),
+    )
+
+
 ARMS: Mapping[str, Callable[[], Arm]] = {
     "ur5": ur5,
     "panda": panda,
     "double-pendulum": double_pendulum,
+    "scara": scara,
 }
 
 

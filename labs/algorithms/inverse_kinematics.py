@@ -1,0 +1,89 @@
+"""Resolved-rate inverse kinematics: joint velocities for a wanted velocity of the end-effector.
+
+A task velocity v (m,) and its Jacobian J (m, n) ask for J q' = v (the relation of the notes,
+1.1.3, read backwards). With J = sum over k of sigma_k u_k r_k^T, three answers:
+
+    pseudo-inverse          q' = J^+ v = sum of r_k (u_k . v) / sigma_k
+    transpose               q' = J^T v = sum of r_k (u_k . v) sigma_k
+    damped least squares    q' = J^T (J J^T + lambda^2 I)^-1 v
+                               = sum of r_k (u_k . v) sigma_k / (sigma_k^2 + lambda^2)
+
+The first is exact wherever v is possible, and unbounded as sigma -> 0. The second never inverts.
+The third minimises |J q' - v|^2 + lambda^2 |q'|^2; since sigma / (sigma^2 + lambda^2) is at most
+1 / (2 lambda), so is |q'| / |v|. (Nakamura and Hanafusa 1986; Wampler 1986.)
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+import pinocchio as pin
+
+NEGLIGIBLE = 1e-12
+"""Singular values below this share of the largest count as zero in the pseudo-inverse."""
+
+METHODS: Mapping[str, str] = {
+    "pseudo-inverse": "Pseudo-inverse",
+    "transpose": "Transpose",
+    "damped": "Damped least squares",
+}
+
+
+def pseudo_inverse(jacobian: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """q' (n,) = J^+ v: of all q' that come closest to J q' = v the shortest. J (m, n), v (m,)."""
+    u, sigma, rt = np.linalg.svd(jacobian, full_matrices=False)
+    kept = sigma > NEGLIGIBLE * sigma[0]
+    rates: np.ndarray = rt[kept].T @ ((u.T @ v)[kept] / sigma[kept])
+    return rates
+
+
+def transpose(jacobian: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """q' (n,) = J^T v: downhill for |e|^2 / 2 where v is proportional to the error e."""
+    rates: np.ndarray = jacobian.T @ v
+    return rates
+
+
+def damped(jacobian: np.ndarray, v: np.ndarray, damping: float) -> np.ndarray:
+    """q' (n,) = J^T (J J^T + lambda^2 I)^-1 v, lambda = `damping` > 0 in the units of J."""
+    m = len(v)
+    rates: np.ndarray = jacobian.T @ np.linalg.solve(
+        jacobian @ jacobian.T + damping**2 * np.eye(m), v
+    )
+    return rates
+
+
+def joint_rates(method: str, jacobian: np.ndarray, v: np.ndarray, damping: float) -> np.ndarray:
+    """q' (n,) by one of METHODS; only damped least squares looks at `damping`."""
+    match method:
+        case "pseudo-inverse":
+            return pseudo_inverse(jacobian, v)
+        case "transpose":
+            return transpose(jacobian, v)
+        case _:
+            return damped(jacobian, v, damping)
+
+
+def pose_error(placement: pin.SE3, target: pin.SE3) -> np.ndarray:
+    """e (6,): p* - p_e [m] above log(R* R_e^T) [rad], in the world's axes. Moving at the
+    constant velocity e for one second leads from `placement` to `target`."""
+    turn = pin.log3(target.rotation @ placement.rotation.T)
+    return np.concatenate([target.translation - placement.translation, turn])
+
+
+def shortened(vector: np.ndarray, longest: float) -> np.ndarray:
+    """`vector`, scaled down where its length exceeds `longest`."""
+    length = float(np.linalg.norm(vector))
+    return vector if length <= longest else vector * (longest / length)
+
+
+def slowed(rates: np.ndarray, fastest: float) -> np.ndarray:
+    """q' (n,), all of it scaled down by one factor where a joint exceeds `fastest`: the
+    direction of the motion stays."""
+    peak = float(np.abs(rates).max())
+    return rates if peak <= fastest else rates * (fastest / peak)
+
+
+def manipulability(jacobian: np.ndarray) -> tuple[np.ndarray, float]:
+    """The singular values of J (m, n), min(m, n) of them from the largest down, and their
+    product: sqrt(det(J J^T)) for m <= n (Yoshikawa 1985)."""
+    sigma = np.linalg.svd(jacobian, compute_uv=False)
+    return sigma, float(np.prod(sigma))

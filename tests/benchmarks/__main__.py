@@ -10,6 +10,7 @@ from tests.benchmarks import headless, latency, load
 MEASURES = {
     "headless": headless.ratio_to_bare_calls,
     "slider": latency.slider_to_telemetry,
+    "scene": latency.slider_to_scene,
     "page": latency.page_to_motion,
     "twelve": load.twelve,
     "growing": load.growing,

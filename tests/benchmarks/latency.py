@@ -6,6 +6,7 @@ import statistics
 import threading
 import time
 from queue import Queue
+from typing import Any
 
 from websockets.exceptions import ConnectionClosed
 
@@ -71,6 +72,33 @@ def _moves(session: Opened, scene: SceneClient) -> list[float]:
 def _labels(scene: SceneClient) -> list[str]:
     scene.read_until(lambda _: any("mplitude" in label for label in scene.controls))
     return list(scene.controls)
+
+
+def slider_to_scene() -> None:
+    """From a joint slider's message to the scene message that turns the joint, in a lab where
+    nothing else moves."""
+    with (
+        Served() as server,
+        server.session("kinematics") as session,
+        SceneClient(session) as scene,
+    ):
+        scene.read_until(lambda _: any(label.startswith("q_1") for label in scene.controls))
+        label = next(label for label in scene.controls if label.startswith("q_1"))
+        times = []
+        for k in range(TRIES):
+            time.sleep(0.05 + 0.001 * (k % 37))  # not in step with the frames
+            begin = time.perf_counter()
+            scene.set(label, 0.5 if k % 2 else -0.5)
+            scene.read_until(_turns_first_joint)
+            times.append(time.perf_counter() - begin)
+    print(
+        f"slider to scene, {len(times)} moves: median {1e3 * statistics.median(times):.1f} ms, "
+        f"p95 {1e3 * _p95(times):.1f} ms, most {1e3 * max(times):.1f} ms"
+    )
+
+
+def _turns_first_joint(found: dict[str, Any]) -> bool:
+    return found["type"] == "SetOrientationMessage" and found["name"].count("/") == 2
 
 
 def page_to_motion() -> None:

@@ -82,8 +82,8 @@ def slider_to_scene() -> None:
         server.session("kinematics") as session,
         SceneClient(session) as scene,
     ):
-        scene.read_until(lambda _: any(label.startswith("q_1") for label in scene.controls))
-        label = next(label for label in scene.controls if label.startswith("q_1"))
+        scene.read_until(lambda _: any(label.startswith("Joint 1") for label in scene.controls))
+        label = next(label for label in scene.controls if label.startswith("Joint 1"))
         times = []
         for k in range(TRIES):
             time.sleep(0.05 + 0.001 * (k % 37))  # not in step with the frames

@@ -16,12 +16,16 @@ class Line:
 
 @dataclass(frozen=True)
 class TimeSeries:
-    """Measured channels over time. `select` names what a vector's components are ("joint")."""
+    """Measured channels over time. `select` names what a vector's components are ("joint").
+    `stacked` lays the solid lines of one component on top of one another as areas, what is
+    negative below zero; while all are chosen, those of component `lead`."""
 
     title: str
     unit: str
     lines: tuple[Line, ...]
     select: str = ""
+    stacked: bool = False
+    lead: int = 0
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,36 @@ class Curve:
     y_label: str
     points: bool = False
     guide: Literal["none", "imaginary-axis", "unit-circle"] = "none"
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One line or set of points among `Curves`: y over x, both 1-D fields of one length, which
+    may change and be 0. "marked" is a line with its points. Without a label it stays out of the
+    legend; `note` names a field of one number (or none) that stands behind the label. `series`
+    is its colour, 1 to 8, or 0 for ink."""
+
+    x: str
+    y: str
+    label: str = ""
+    style: Literal["line", "marked", "points", "dash"] = "line"
+    series: int = 0
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Several traces in one chart. On a logarithmic axis what is not positive is left out.
+    `equal` gives both axes one scale; the guide is as in `Curve`."""
+
+    title: str
+    traces: tuple[Trace, ...]
+    x_label: str
+    y_label: str
+    log_x: bool = False
+    log_y: bool = False
+    guide: Literal["none", "imaginary-axis", "unit-circle"] = "none"
+    equal: bool = False
 
 
 @dataclass(frozen=True)
@@ -82,7 +116,7 @@ class Readout:
     unit: str
 
 
-Plot = TimeSeries | Curve | HeatMap | Matrix | Bars | Readout
+Plot = TimeSeries | Curve | Curves | HeatMap | Matrix | Bars | Readout
 
 
 def measured(plot: Plot) -> tuple[str, ...]:
@@ -97,6 +131,9 @@ def pictured(plot: Plot) -> tuple[str, ...]:
     match plot:
         case Curve(x=x, y=y):
             return (x, y)
+        case Curves(traces=traces):
+            named = (name for trace in traces for name in (trace.x, trace.y, trace.note))
+            return tuple(name for name in named if name)
         case HeatMap(x=x, y=y, z=z):
             return (x, y, z)
         case Matrix(field=field):

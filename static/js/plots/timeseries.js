@@ -37,7 +37,9 @@ export class TimeSeries {
       if (n === null) return;
       if (n === 0) return curves.push({ column: line.channel, line, l, c: null });
       const all = [...Array(n).keys()];
-      const shown = chosen === "all" || chosen === null ? all : all.filter((c) => c === chosen);
+      const every = chosen === "all" || chosen === null;
+      const one = every && this.plot.stacked ? Math.min(this.plot.lead, n - 1) : chosen;
+      const shown = every && !this.plot.stacked ? all : all.filter((c) => c === one);
       if (line.style !== "limit") this.components = Math.max(this.components, shown.length);
       for (const c of shown) curves.push({ column: `${line.channel}[${c}]`, line, l, c });
     });
@@ -71,7 +73,7 @@ export class TimeSeries {
       },
       scales: {
         x: { time: false, auto: false, range: (u, low, high) => [low, high] },
-        y: { range: (u, low, high) => this.range(low, high) },
+        y: { range: (u, low, high) => this.range(low, high, u) },
       },
       axes: [
         { ...axis, size: 1.75 * rem(), gap: 4, space: 4 * rem(), values: (u, ticks) => ticks.map((t) => `${+t.toFixed(6)} s`) },
@@ -79,7 +81,7 @@ export class TimeSeries {
       ],
       series: [{}, ...this.curves.map((curve) => this.series(curve))],
       hooks: {
-        drawAxes: [(u) => this.drawGhost(u)],
+        drawAxes: [(u) => this.drawAreas(u), (u) => this.drawGhost(u)],
         setSelect: [(u) => this.zoom(u)],
         setCursor: [() => this.readOut(true)],
       },
@@ -93,11 +95,13 @@ export class TimeSeries {
   series({ line, tone, l, c }) {
     const dash = { dash: [7, 5], limit: [3, 4] }[line.style];
     const limit = line.style === "limit";
+    const area = this.isArea(line);
     return {
       stroke: colour(tone),
+      ...(area && { paths: () => null }), // drawn by drawAreas
       width: limit || dash ? 1.25 : 1.75,
       dash,
-      auto: !limit, // a far limit must not flatten the curves
+      auto: !limit && !area, // a far limit must not flatten the curves
       points: { show: false },
       show: !this.hidden.has(`l${l}`) && !this.hidden.has(`c${c}`),
     };
@@ -124,9 +128,15 @@ export class TimeSeries {
 
   // The y range: the curves and the ghost, and a limit once a curve comes near it. It grows at
   // once but shrinks only when much of it is empty, so that it does not tremble.
-  range(low, high) {
+  range(low, high, u) {
     const [from, to] = this.board.range();
     if (low === null || low === undefined) [low, high] = [Infinity, -Infinity];
+    for (const { from, to } of this.areas(u)) {
+      for (const value of [...from, ...to]) {
+        if (value < low) low = value;
+        if (value > high) high = value;
+      }
+    }
     for (const samples of this.ghostSamples(from, to)) {
       for (const value of samples.y) {
         if (value < low) low = value;
@@ -149,13 +159,51 @@ export class TimeSeries {
     return this.span ?? (this.span = wanted);
   }
 
+  isArea(line) {
+    return Boolean(this.plot.stacked) && line.style === "solid";
+  }
+
+  // The stacked curves shown, each with where it begins and ends at every sample: positive
+  // values upward from zero, negative ones downward.
+  *areas(u) {
+    if (!this.plot.stacked || !u.data) return;
+    const up = new Float64Array(u.data[0].length);
+    const down = new Float64Array(u.data[0].length);
+    for (const [i, curve] of this.curves.entries()) {
+      if (!this.isArea(curve.line) || !u.series[i + 1].show) continue;
+      const samples = Float64Array.from(u.data[i + 1]);
+      const from = samples.map((value, k) => (value >= 0 ? up[k] : down[k]));
+      const to = samples.map((value, k) => from[k] + value);
+      samples.forEach((value, k) => ((value >= 0 ? up : down)[k] = to[k]));
+      yield { curve, from, to };
+    }
+  }
+
+  drawAreas(u) {
+    const { ctx, bbox } = u;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    ctx.globalAlpha = 0.6;
+    for (const { curve, from, to } of this.areas(u)) {
+      const x = Array.from(u.data[0], (t) => u.valToPos(t, "x", true));
+      ctx.fillStyle = colour(curve.tone);
+      ctx.beginPath();
+      to.forEach((value, k) => ctx.lineTo(x[k], u.valToPos(value, "y", true)));
+      for (let k = x.length - 1; k >= 0; k--) ctx.lineTo(x[k], u.valToPos(from[k], "y", true));
+      ctx.fill();
+    }
+    ctx.restore();
+  }
+
   *ghostSamples(from, to) {
     const ghost = this.board.ghost;
     if (!ghost) return;
     const [a, b] = ghost.span(from, to);
     const stride = Math.max(1, Math.floor((b - a) / 600));
     for (const curve of this.curves) {
-      if (curve.line.style === "limit" || this.hidden.has(`l${curve.l}`) || this.hidden.has(`c${curve.c}`)) continue;
+      if (curve.line.style === "limit" || this.isArea(curve.line) || this.hidden.has(`l${curve.l}`) || this.hidden.has(`c${curve.c}`)) continue;
       const y = ghost.column(curve.column);
       if (y) yield { curve, x: thin(ghost.column("t"), a, b, stride), y: thin(y, a, b, stride) };
     }
@@ -194,7 +242,7 @@ export class TimeSeries {
     const several = this.components > 1;
     const lines = new Map(this.curves.map((curve) => [curve.l, curve]));
     for (const [l, { line, tone, c }] of lines) {
-      const button = this.switch(`l${l}`, line.style, several && line.style !== "limit" ? "axis" : tone);
+      const button = this.switch(`l${l}`, this.isArea(line) ? "area" : line.style, several && line.style !== "limit" ? "axis" : tone);
       button.append(symbol(line.mathml, several ? null : c));
       if (!several) this.values.push([l, button.appendChild(element("output", "", "—"))]);
     }

@@ -51,7 +51,7 @@ class Kinematics:
             [np.ravel(model.joints[j].createData().S) for j in range(1, model.njoints)]
         )
         assert subspaces.shape == (n, 6)
-        self._prismatic = ~subspaces[:, 3:].any(axis=1)
+        self._prismatic: np.ndarray = ~np.any(subspaces[:, 3:], axis=1)
         self._axes = np.where(self._prismatic[:, None], subspaces[:, :3], subspaces[:, 3:])
         supports = set(model.supports[model.frames[frame].parentJoint])
         self._carries = np.array([j in supports for j in range(1, model.njoints)])
@@ -129,9 +129,7 @@ def inverse_rate_matrix(angles: np.ndarray) -> np.ndarray:
     c, s = np.cos(psi), np.sin(psi)
     cos = max(float(np.cos(theta)), SMALLEST_COS)
     sin = np.sin(theta)
-    return np.array(
-        [[c / cos, s / cos, 0.0], [-s, c, 0.0], [c * sin / cos, s * sin / cos, 1.0]]
-    )
+    return np.array([[c / cos, s / cos, 0.0], [-s, c, 0.0], [c * sin / cos, s * sin / cos, 1.0]])
 
 
 def analytical(chain: Chain, jacobian: np.ndarray) -> np.ndarray:

@@ -109,11 +109,13 @@ class Bars:
 
 @dataclass(frozen=True)
 class Readout:
-    """A scalar channel as a number. Where it is not defined (yet), `measure` leaves it out."""
+    """A scalar channel as a number. Where it is not defined (yet), `measure` leaves it out.
+    `whole` is for counts: no decimals."""
 
     channel: str
     label: str
     unit: str
+    whole: bool = False
 
 
 Plot = TimeSeries | Curve | Curves | HeatMap | Matrix | Bars | Readout

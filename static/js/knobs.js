@@ -16,28 +16,29 @@ export class Knobs {
   }
 
   wire(tunable, row) {
-    const field = row.querySelector(".value :is(input, select)");
+    const field = row.querySelector(".value :is(input, select, textarea)");
     const wrong = row.querySelector(".wrong");
     const undo = row.querySelector(".undo");
     const entry = { tunable, row, field, wrong, undo, until: 0 };
     field.addEventListener("change", () => this.commit(entry, read(entry)));
     undo.addEventListener("click", () => this.commit(entry, tunable.default));
-    if (tunable.kind === "knob") {
-      field.addEventListener("focus", () => field.select());
+    if (tunable.kind === "knob") field.addEventListener("focus", () => field.select());
+    if (typed(entry)) {
       field.addEventListener("keydown", (event) => this.onKey(event, entry));
     }
     return entry;
   }
 
   onKey(event, entry) {
-    if (event.key === "Enter") entry.field.blur();
+    const lines = entry.field.tagName === "TEXTAREA"; // where Enter begins another
+    if (event.key === "Enter" && (!lines || event.ctrlKey || event.metaKey)) entry.field.blur();
     if (event.key === "Escape") {
       write(entry, this.values[entry.tunable.name]);
       entry.wrong.hidden = true;
       entry.field.blur();
     }
     const step = { ArrowUp: 1, ArrowDown: -1 }[event.key];
-    if (!step) return;
+    if (!step || entry.tunable.kind !== "knob") return;
     event.preventDefault();
     const value = nudged(entry.tunable, this.values[entry.tunable.name], step);
     write(entry, value);
@@ -55,7 +56,8 @@ export class Knobs {
       entry.until = 0;
       wrong.textContent = error.message;
       wrong.hidden = false;
-      write(entry, this.values[tunable.name]);
+      // A text that is wrong stays, to be put right; Escape brings the valid one back.
+      if (tunable.kind !== "text") write(entry, this.values[tunable.name]);
     }
   }
 
@@ -66,7 +68,7 @@ export class Knobs {
       if (value === undefined) continue;
       const known = this.values[name];
       const own = performance.now() < entry.until;
-      const typing = document.activeElement === entry.field && entry.tunable.kind === "knob";
+      const typing = document.activeElement === entry.field && typed(entry);
       if (value === known && !own) continue;
       if (own && value === known) continue;
       this.values[name] = value;
@@ -85,6 +87,7 @@ export class Knobs {
 function read({ tunable, field }) {
   if (tunable.kind === "toggle") return field.checked;
   if (tunable.kind === "choice") return tunable.options[Number(field.value)].value;
+  if (tunable.kind === "text") return field.value;
   const text = field.value.trim().replace("−", "-").replace(/^(-?\d+),(\d+)$/, "$1.$2");
   const value = Number(text);
   return text !== "" && Number.isFinite(value) ? value : text;
@@ -94,7 +97,13 @@ function write({ tunable, field }, value) {
   if (value === undefined) return;
   if (tunable.kind === "toggle") field.checked = value;
   else if (tunable.kind === "choice") field.value = tunable.options.findIndex((option) => option.value === value);
+  else if (tunable.kind === "text") field.value = value;
   else field.value = plain(value);
+}
+
+// Whether it is a field one types into.
+function typed({ tunable }) {
+  return tunable.kind === "knob" || tunable.kind === "text";
 }
 
 // The value a little further along the slider.

@@ -42,6 +42,7 @@ function fromText(text, tunable) {
   if (tunable?.kind === "toggle") {
     return { true: true, 1: true, on: true, false: false, 0: false, off: false }[text.toLowerCase()] ?? text;
   }
+  if (tunable?.kind === "text") return text;
   const value = Number(text);
   return text.trim() !== "" && Number.isFinite(value) ? value : text;
 }

@@ -7,6 +7,7 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from numpy.typing import ArrayLike
 
@@ -14,8 +15,8 @@ from labs import plots
 from labs.catalog import Entry, catalog
 from labs.lab import Inputs, Snapshot, State
 from labs.models.arms import Arm
-from labs.params import Choice, Knob, Params, Toggle, Value
-from labs.plots import Bars, Curve, HeatMap, Matrix, Readout, TimeSeries
+from labs.params import Choice, Knob, Params, Text, Toggle, Value
+from labs.plots import Bars, Curve, Curves, HeatMap, Matrix, Readout, TimeSeries
 from labs.run import Event, World, run
 from labs.scene import Color
 from server.articles import render, tex
@@ -30,13 +31,16 @@ ENTRIES = list(catalog().values())
 
 
 def extremes(entry: Entry) -> Iterator[tuple[str, Value]]:
-    """Both ends of every knob, every option of every choice, both sides of every toggle."""
+    """Both ends of every knob, every option of every choice, both sides of every toggle, and of a
+    text what it says by default."""
     for name, tunable in entry.lab.Params.tunables.items():
         match tunable:
             case Knob():
                 values: list[Any] = [tunable.low, tunable.high]
             case Choice():
                 values = list(tunable.options)
+            case Text():
+                values = [getattr(entry.lab.Params(), name)]
             case _:
                 values = [False, True]
         for value in values:
@@ -106,6 +110,35 @@ class CheckingScene:
         self._new(name, color)
         _point(center)
         assert 0.0 < radius < np.inf
+
+    def frame(self, name: str, placement: pin.SE3, length: float = 0.15) -> None:
+        self._new(name)
+        assert np.isfinite(placement.homogeneous).all()
+        np.testing.assert_allclose(placement.rotation @ placement.rotation.T, np.eye(3), atol=1e-6)
+        assert 0.0 < length < np.inf
+
+    def arc(
+        self,
+        name: str,
+        center: ArrayLike,
+        axis: ArrayLike,
+        angle: float,
+        radius: float,
+        color: Color = "force",
+    ) -> None:
+        self._new(name, color)
+        _point(center)
+        assert np.linalg.norm(_point(axis)) > 0.0, "an arc has an axis"
+        assert -2 * np.pi < angle < 2 * np.pi
+        assert 0.0 < radius < np.inf
+
+    def ellipsoid(
+        self, name: str, center: ArrayLike, axes: np.ndarray, color: Color = "actual"
+    ) -> None:
+        self._new(name, color)
+        _point(center)
+        assert axes.shape == (3, 3)
+        assert np.isfinite(axes).all()
 
     def handle(self, name: str, position: ArrayLike, radius: float = 0.05) -> None:
         self._new(name)
@@ -236,7 +269,7 @@ def test_every_parameter_is_documented(entry: Entry) -> None:
                 assert len(tunable.options) >= 2, f"{name} leaves a choice"
                 assert all(text.strip() for text in tunable.options.values()), name
             case _:
-                assert isinstance(tunable, Toggle)
+                assert isinstance(tunable, Text | Toggle)
     labels = [(t.group, t.label) for t in entry.lab.Params.tunables.values()]
     assert len(labels) == len(set(labels)), "no two sliders of a group look alike"
 
@@ -306,6 +339,18 @@ def test_plots_name_real_channels(entry: Entry) -> None:
             case Curve(x=x, y=y):
                 assert np.ndim(pictured[x]) == 1
                 assert np.shape(pictured[x]) == np.shape(pictured[y])
+            case Curves(traces=traces, log_x=log_x, log_y=log_y, equal=equal):
+                for trace in traces:
+                    assert np.ndim(pictured[trace.x]) == 1
+                    assert np.shape(pictured[trace.x]) == np.shape(pictured[trace.y]), trace
+                    assert 0 <= trace.series <= 8, trace
+                    assert trace.label or not trace.note, f"{trace}: a note stands by a label"
+                    if trace.note:
+                        assert np.shape(pictured[trace.note]) in {(0,), (1,)}, trace
+                labels = [trace.label for trace in traces if trace.label]
+                assert labels, f"{plot}: a legend names what is drawn"
+                assert len(labels) == len(set(labels)), plot
+                assert not (equal and (log_x or log_y)), f"{plot}: one scale is linear"
             case HeatMap(x=x, y=y, z=z):
                 assert np.shape(pictured[z]) == (len(pictured[y]), len(pictured[x]))
             case Matrix(field=name, symbol=symbol):

@@ -8,7 +8,7 @@ import numpy as np
 
 from labs.lab import Action, Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Params, Value, choice, knob, toggle
-from labs.plots import Bars, Curve, HeatMap, Line, Matrix, Readout, TimeSeries
+from labs.plots import Bars, Curve, Curves, HeatMap, Line, Matrix, Readout, TimeSeries, Trace
 from labs.scene import Scene
 
 
@@ -44,6 +44,17 @@ class Oscillator(Lab[OscillatorParams, OscillatorState]):
     plots = (
         TimeSeries("Position", "m", (Line("x", "x"), Line("both", "y", "dash")), select="part"),
         Curve("Phase", "angle", "wave", "angle [rad]", "wave"),
+        Curves(
+            "Waves",
+            (
+                Trace("angle", "wave", "wave", "marked", 1, note="size"),
+                Trace("angle", "square", "square", "dash", 2),
+                Trace("size", "size", style="points"),
+            ),
+            "angle [rad]",
+            "wave",
+            log_y=True,
+        ),
         HeatMap("Field", "angle", "angle", "field", "a [rad]", "b [rad]", "value"),
         Matrix("Matrix", "matrix", "M", shade=True),
         Bars("Bars", "bars", "b", "m", "limits"),
@@ -100,6 +111,8 @@ class Oscillator(Lab[OscillatorParams, OscillatorState]):
         return {
             "angle": angle,
             "wave": wave,
+            "square": wave**2,
+            "size": np.array([abs(state.x)]),
             "field": np.outer(wave, np.cos(angle)),
             "matrix": np.array([[state.x, 1.0], [1.0, -state.x]]),
             "bars": np.array([state.x, 0.5]),

@@ -5,13 +5,14 @@ import { History } from "../history.js";
 import { Bars } from "./bars.js";
 import { element } from "./card.js";
 import { Curve } from "./curve.js";
+import { Curves } from "./curves.js";
 import { HeatMap } from "./heatmap.js";
 import { Matrix } from "./matrix.js";
 import { forgetColours } from "./palette.js";
 import { Readouts } from "./readouts.js";
 import { TimeSeries } from "./timeseries.js";
 
-const KINDS = { TimeSeries, Curve, Bars, Matrix, HeatMap };
+const KINDS = { TimeSeries, Curve, Curves, Bars, Matrix, HeatMap };
 
 export class Board {
   constructor(lab) {

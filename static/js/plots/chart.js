@@ -11,8 +11,9 @@ export class Chart {
     new ResizeObserver(draw).observe(body);
   }
 
-  // Clears, and draws axes for the ranges. `square` gives both axes the same scale.
-  begin([x0, x1], [y0, y1], { square = false, xTicks = null, xLabel = "", yLabel = "" } = {}) {
+  // Clears, and draws axes for the ranges. `square` gives both axes the same scale. On a
+  // logarithmic axis the range is of logarithms to the base 10, as are all places drawn.
+  begin([x0, x1], [y0, y1], { square = false, xTicks = null, xLabel = "", yLabel = "", logX = false, logY = false } = {}) {
     const { clientWidth: width, clientHeight: height } = this.body;
     const em = 0.75 * parseFloat(getComputedStyle(document.documentElement).fontSize);
     const left = 4.2 * em + (yLabel ? 1.6 * em : 0);
@@ -27,13 +28,13 @@ export class Chart {
     this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     this.svg.replaceChildren();
     const { top } = this.area;
-    for (const v of ticks(y0, y1, this.area.height / (3 * em))) {
-      this.line([x0, v], [x1, v], v === 0 ? "zero" : "grid");
-      this.text(left - 0.5 * em, this.y(v) + 0.35 * em, label(v), "end");
+    for (const v of (logY ? decades : ticks)(y0, y1, this.area.height / (3 * em))) {
+      this.line([x0, v], [x1, v], v === 0 && !logY ? "zero" : "grid");
+      this.text(left - 0.5 * em, this.y(v) + 0.35 * em, (logY ? power : label)(v), "end");
     }
-    for (const v of xTicks ?? ticks(x0, x1, this.area.width / (6 * em))) {
-      if (!xTicks) this.line([v, y0], [v, y1], v === 0 ? "zero" : "grid");
-      this.text(this.x(v), top + this.area.height + 1.5 * em, label(v), "middle");
+    for (const v of xTicks ?? (logX ? decades : ticks)(x0, x1, this.area.width / (6 * em))) {
+      if (!xTicks) this.line([v, y0], [v, y1], v === 0 && !logX ? "zero" : "grid");
+      this.text(this.x(v), top + this.area.height + 1.5 * em, (logX ? power : label)(v), "middle");
     }
     if (xLabel) this.text(left + this.area.width / 2, height - 0.35 * em, xLabel, "middle");
     if (yLabel) {
@@ -86,6 +87,24 @@ function ticks(low, high, most) {
   const found = [];
   for (let k = Math.ceil(low / step); k * step <= high; k++) found.push(+(k * step).toPrecision(12));
   return found;
+}
+
+// Ticks of a logarithmic axis: whole decades, or 1, 2 and 5 of each where there are few.
+function decades(low, high, most) {
+  const stride = Math.max(1, Math.ceil((high - low) / Math.max(1, most)));
+  const steps = high - low > 2 ? [0] : [0, Math.log10(2), Math.log10(5)];
+  const found = [];
+  for (let k = Math.floor(low / stride) * stride; k <= high; k += stride) {
+    found.push(...steps.map((part) => k + part).filter((v) => v >= low && v <= high));
+  }
+  return found;
+}
+
+// The number whose logarithm this is.
+function power(exponent) {
+  const value = Number((10 ** exponent).toPrecision(3));
+  if (Math.abs(exponent) <= 3) return label(value);
+  return "10" + String(Math.round(exponent)).replace(/[-0-9]/g, (c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]);
 }
 
 function label(value) {

@@ -5,7 +5,7 @@ import { element } from "./card.js";
 
 export class Readouts {
   constructor(plots, host) {
-    this.tiles = plots.map(({ channel, label, unit }) => {
+    this.tiles = plots.map(({ channel, label, unit, whole }) => {
       const tile = element("div", "tile");
       const name = element("span", "", label);
       name.title = label;
@@ -15,14 +15,15 @@ export class Readouts {
       line.append(output, " ", element("small", "", unit));
       tile.append(name, line);
       host.append(tile);
-      return { channel, output };
+      return { channel, output, whole };
     });
     host.hidden = plots.length === 0;
   }
 
   update(run) {
-    for (const { channel, output } of this.tiles) {
-      const text = number(run.latest(channel), 3);
+    for (const { channel, output, whole } of this.tiles) {
+      const value = run.latest(channel);
+      const text = whole && Number.isInteger(value) ? String(value) : number(value, 3);
       if (output.textContent !== text) output.textContent = text;
     }
   }

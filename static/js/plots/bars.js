@@ -32,7 +32,7 @@ export class Bars {
       const [a, b] = [chart.y(Math.max(0, value)), chart.y(Math.min(0, value))];
       const left = chart.x(i + 0.7);
       const full = Math.abs(value) >= 0.999 * this.limits[i];
-      chart.add("rect", { x: left, y: a, width: chart.x(i + 1.3) - left, height: Math.max(1, b - a), class: full ? "bar full" : "bar" });
+      chart.add("rect", { x: left, y: a, width: chart.x(i + 1.3) - left, height: Math.max(1, b - a), class: full ? "column full" : "column" });
     });
     this.limits.forEach((limit, i) => {
       for (const edge of [limit, -limit]) chart.line([i + 0.6, edge], [i + 1.4, edge], "limit");

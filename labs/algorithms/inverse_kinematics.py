@@ -24,7 +24,7 @@ NEGLIGIBLE = 1e-12
 METHODS: Mapping[str, str] = {
     "pseudo-inverse": "Pseudo-inverse",
     "transpose": "Transpose",
-    "damped": "Damped least squares",
+    "damped": "Damped",
 }
 
 

@@ -31,28 +31,28 @@ LAP = 8.0
 """[s] the target's way out and back."""
 WORST_CONDITION = 1e6
 """Shown for any condition number beyond it."""
-AXIS, COLUMN, TWIST = 0.2, 0.35, 0.4
+AXIS, COLUMN, TWIST = 0.3, 0.4, 0.8
 """[m] length of an axis; of a column of J_p per m/rad; of the velocity per m/s."""
 VELOCITY_BALL, FORCE_BALL, LONGEST = 0.25, 0.06, 0.8
 """[m] per unit singular value of J_p, and of its inverse; longest half-axis drawn."""
 
+NEARER = 0.8
+"""Times the arm's usual distance: where the camera stands."""
 UP = np.array([0.0, 0.0, 1.0])
 
-ROBOTS = {"ur5": "UR5", "panda": "Franka Panda", "scara": "SCARA (joint 3 slides)"}
+ROBOTS = {"ur5": "UR5", "panda": "Franka Panda", "scara": "SCARA"}
 FRAMES = {
     "end-effector": "End-effector",
     **{f"joint-{i}": f"Frame of joint {i}" for i in range(2, 8)},
 }
 MODES = {
-    "posture": "Pose it with the sliders",
-    "velocity": "Move at the joint velocities",
-    "follow": "Follow the target",
+    "posture": "Pose by sliders",
+    "velocity": "Joint velocities",
+    "follow": "Follow a target",
 }
-TASKS = {"position": "Position", "pose": "Position and orientation"}
+TASKS = {"position": "Position", "pose": "Full pose"}
 ELLIPSOIDS = {"velocity": "Velocity", "force": "Force", "both": "Both", "none": "None"}
-COLUMNS = {"all": "All, at the joints", "none": "None"} | {
-    str(i): f"Joint {i}, with its lever" for i in range(1, 8)
-}
+COLUMNS = {"all": "All", "none": "None"} | {str(i): f"Joint {i}, lever" for i in range(1, 8)}
 
 
 def _angle(i: int) -> Any:
@@ -106,6 +106,31 @@ class DifferentialParams(Params):
         group="Robot",
         help="Stand as posed, move at the joint velocities below, or follow the target.",
     )
+    q1: float = _angle(1)
+    q2: float = _angle(2)
+    q3: float = _angle(3)
+    q4: float = _angle(4)
+    q5: float = _angle(5)
+    q6: float = _angle(6)
+    q7: float = _angle(7)
+    lift: float = knob(
+        0.0,
+        -0.15,
+        0.15,
+        symbol="d",
+        unit="m",
+        label="Slide",
+        group="Posture",
+        step=0.001,
+        help="The sliding joint of the SCARA; ignored by the other robots.",
+    )
+    dq1: float = _rate(1, 0.5)
+    dq2: float = _rate(2)
+    dq3: float = _rate(3)
+    dq4: float = _rate(4)
+    dq5: float = _rate(5)
+    dq6: float = _rate(6)
+    dq7: float = _rate(7)
     columns: str = choice(
         "all",
         COLUMNS,
@@ -128,7 +153,7 @@ class DifferentialParams(Params):
         label="Task",
         group="Inverse kinematics",
         effect="restart",
-        help="What must follow the target; singular values are those of its rows of J.",
+        help="What must follow the target, the position alone or the orientation too; singular values are those of its rows of J.",
     )
     method: str = choice(
         "damped",
@@ -181,31 +206,6 @@ class DifferentialParams(Params):
         step=0.01,
         help="The target moves this far away from the base axis and back, in 8 s.",
     )
-    q1: float = _angle(1)
-    q2: float = _angle(2)
-    q3: float = _angle(3)
-    q4: float = _angle(4)
-    q5: float = _angle(5)
-    q6: float = _angle(6)
-    q7: float = _angle(7)
-    lift: float = knob(
-        0.0,
-        -0.15,
-        0.15,
-        symbol="d",
-        unit="m",
-        label="Slide",
-        group="Posture",
-        step=0.001,
-        help="The sliding joint of the SCARA; ignored by the other robots.",
-    )
-    dq1: float = _rate(1, 0.5)
-    dq2: float = _rate(2)
-    dq3: float = _rate(3)
-    dq4: float = _rate(4)
-    dq5: float = _rate(5)
-    dq6: float = _rate(6)
-    dq7: float = _rate(7)
 
     @property
     def arm(self) -> Arm:
@@ -412,7 +412,8 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         chain = _kinematics(params.robot, params.frame).at(q)
         jacobian = geometric(chain)
         tip = chain.placement.translation
-        scene.camera(*params.arm.camera)
+        position, look_at = map(np.array, params.arm.camera)
+        scene.camera(look_at + NEARER * (position - look_at), look_at)
         scene.arm("robot", params.arm, q)
         scene.frame("frame", chain.placement, 0.12)
         _draw_columns(scene, params.columns, chain, jacobian)
@@ -488,7 +489,7 @@ def _draw_columns(scene: Scene, columns: str, chain: Chain, jacobian: np.ndarray
         alone = columns == str(i + 1)
         if not (alone or columns == "all") or not chain.carries[i]:
             continue
-        scene.arrow(f"axis {i + 1}", p, p + AXIS * z, "muted")
+        scene.arrow(f"axis {i + 1}", p - AXIS / 2 * z, p + AXIS / 2 * z, "muted")
         if alone:
             scene.trail("lever", np.array([p, tip]), "actual")
         start = tip if alone else p

@@ -93,6 +93,23 @@ def test_the_double_pendulum_is_the_textbook_one() -> None:
     np.testing.assert_allclose(data.oMf[arm.tip].translation, [0.0, 1.0, 1.3], atol=1e-12)
 
 
+def test_the_scara_is_the_textbook_one() -> None:
+    """Two links in the plane, and a quill whose weight only its own motor carries."""
+    arm = load("scara")
+    data = arm.model.createData()
+    q = np.array([0.3, 1.1, 0.05, -0.7])
+    pin.framesForwardKinematics(arm.model, data, q)
+    tip = data.oMf[arm.tip]
+    x, y = 0.4 * np.cos(0.3) + 0.3 * np.cos(1.4), 0.4 * np.sin(0.3) + 0.3 * np.sin(1.4)
+    np.testing.assert_allclose(tip.translation, [x, y, 0.28 + 0.05], atol=1e-15)
+    np.testing.assert_allclose(tip.rotation, pin.exp3(np.array([0.0, 0.0, 0.7])), atol=1e-15)
+    gravity = pin.computeGeneralizedGravity(arm.model, data, q)
+    np.testing.assert_allclose(gravity, [0.0, 0.0, 1.5 * 9.81, 0.0], atol=1e-12)
+    mass = pin.crba(arm.model, data, q)
+    assert mass[2, 2] == pytest.approx(1.5 + arm.model.armature[2], rel=1e-14)
+    np.testing.assert_allclose(mass[2, [0, 1, 3]], 0.0, atol=1e-15)
+
+
 def test_an_unknown_name_is_refused_with_those_there_are() -> None:
     with pytest.raises(LabError, match=r"'ur6'.*ur5, panda, double-pendulum"):
         load("ur6")

@@ -8,11 +8,9 @@ from typing import Any, ClassVar
 import numpy as np
 import pinocchio as pin
 
+from labs.algorithms.frame_chain import FrameChain, product
 from labs.algorithms.orientation import (
     SEQUENCES,
-    angle_axis_to_matrix,
-    euler_axes,
-    euler_to_matrix,
     lock_sine,
     lost_direction,
     matrix_to_angle_axis,
@@ -22,6 +20,7 @@ from labs.algorithms.orientation import (
 )
 from labs.lab import Inputs, Lab, Measurement, State
 from labs.models.arms import load
+from labs.models.gimbal import Gimbal
 from labs.params import Params, Value, choice, knob, toggle
 from labs.plots import Line, Matrix, Readout, TimeSeries
 from labs.scene import Scene
@@ -39,7 +38,6 @@ GIMBAL = np.array([-0.2, -0.45, 0.36])
 """[m] where the body in the gimbal is."""
 RINGS = (0.2, 0.17)
 """[m] radii of the outer and the inner ring."""
-CIRCLE = np.linspace(0.0, 2.0 * np.pi, 49)
 
 
 def _angle(i: int, default: float) -> Any:
@@ -155,24 +153,8 @@ class KinematicsParams(Params):
         return min(wanted, int(load(self.robot).model.nq))
 
     @property
-    def middle(self) -> float:
-        """The middle Euler angle [rad] about which the wobble is."""
-        three_axes = self.sequence[2] != self.sequence[0]
-        return np.pi / 2 - self.distance if three_axes else self.distance
-
-    @property
-    def axis(self) -> np.ndarray:
-        """(3,) the axis in the world the body in the gimbal turns about."""
-        if self.direction == "lost":
-            return lost_direction(self.sequence, 0.0)
-        which = 0 if self.direction == "first" else 1
-        axis: np.ndarray = np.eye(3)["xyz".index(self.sequence[which])]
-        return axis
-
-    @property
-    def wobble(self) -> tuple[str, float, str, float, float]:
-        """All that decides how fast the body's angles get."""
-        return self.sequence, self.distance, self.direction, self.size, self.frequency
+    def gimbal(self) -> Gimbal:
+        return Gimbal(self.sequence, self.distance, self.direction, self.size)
 
 
 @dataclass(kw_only=True)
@@ -187,12 +169,17 @@ class KinematicsState(State):
     """Of the wobble [cycles]."""
     rotation: np.ndarray
     """(3, 3) the orientation of the body in the gimbal."""
-    wobble: tuple[str, float, str, float, float]
-    """The settings the two peaks are of."""
+    gimbal: Gimbal
+    """The settings the two peaks are of, with the frequency."""
+    frequency: float
+    rate: float = 0.0
+    """[rad/s] the mean over the last step of the Euler angle that changed fastest, jumps between
+    pi and -pi taken out."""
+    speed: float = 0.0
+    """[rad/s] the mean angular speed of the body over the last step."""
     peak_rate: float = 0.0
-    """[rad/s] the fastest an Euler angle changed over a step, jumps across +-pi taken out."""
     peak_speed: float = 0.0
-    """[rad/s] the fastest the body turned over a step."""
+    """[rad/s] the largest of both since these settings."""
 
 
 class Kinematics(Lab[KinematicsParams, KinematicsState]):
@@ -236,6 +223,11 @@ class Kinematics(Lab[KinematicsParams, KinematicsState]):
                 Line("quaternion_gain", r"|\dot Q| / |\omega|"),
             ),
         ),
+        TimeSeries(
+            "Gimbal: fastest angle and body",
+            "rad/s",
+            (Line("rate", r"\max|\dot\varphi_i|"), Line("speed", r"|\omega|")),
+        ),
         Readout("shown", "Factor shown, i", "", whole=True),
         Readout("orthogonality", "‖RᵀR − I‖", ""),
         Readout("determinant", "det R", ""),
@@ -262,41 +254,48 @@ class Kinematics(Lab[KinematicsParams, KinematicsState]):
     def init(self, params: KinematicsParams, rng: np.random.Generator) -> KinematicsState:
         """The body at the middle of its wobble."""
         return KinematicsState(
-            sliders=params.sliders, rotation=body(params, 0.0), wobble=params.wobble
+            sliders=params.sliders,
+            rotation=params.gimbal.rotation(0.0),
+            gimbal=params.gimbal,
+            frequency=params.frequency,
         )
 
     def step(
         self, params: KinematicsParams, inputs: Inputs, state: KinematicsState
     ) -> KinematicsState:
         """Notes which slider moved, and turns the body in the gimbal on."""
+        gimbal = params.gimbal
         changes = np.abs(params.sliders - state.sliders)
         phase = state.phase + params.frequency * self.period
-        before, rotation = body(params, state.phase), body(params, phase)
+        before, rotation = gimbal.rotation(state.phase), gimbal.rotation(phase)
         turned, _ = matrix_to_angle_axis(before.T @ rotation)
-        angles = _wrapped(
-            matrix_to_euler(params.sequence, rotation) - matrix_to_euler(params.sequence, before)
-        )
-        same = params.wobble == state.wobble
+        angles = _wrapped(gimbal.angles(rotation) - gimbal.angles(before))
+        rate, speed = float(np.abs(angles).max()) / self.period, turned / self.period
+        same = gimbal == state.gimbal and params.frequency == state.frequency
         return KinematicsState(
             t=round(state.t / self.period + 1.0) * self.period,
             sliders=params.sliders,
             moved=int(changes.argmax()) + 1 if changes.any() else state.moved,
             phase=phase % 1.0,
             rotation=rotation,
-            wobble=params.wobble,
-            peak_rate=max(state.peak_rate * same, float(np.abs(angles).max()) / self.period),
-            peak_speed=max(state.peak_speed * same, turned / self.period),
+            gimbal=gimbal,
+            frequency=params.frequency,
+            rate=rate,
+            speed=speed,
+            peak_rate=max(state.peak_rate * same, rate),
+            peak_speed=max(state.peak_speed * same, speed),
         )
 
     def measure(self, params: KinematicsParams, state: KinematicsState) -> Measurement:
         """Of the body in the gimbal: its angles, its quaternion, and how much faster than itself
         its angles turn now (`amplification`) and at most in any direction (`law`). Of the
         end-effector: how far its R is from orthonormal, and the same law."""
-        rotation = whole(chain(params.robot, params.q))[:3, :3]
-        tool = lock_sine(params.sequence, matrix_to_euler(params.sequence, rotation)[1])
-        angles = matrix_to_euler(params.sequence, state.rotation)
-        nudged = angle_axis_to_matrix(NUDGE, params.axis) @ state.rotation
-        change = _wrapped(matrix_to_euler(params.sequence, nudged) - angles)
+        gimbal = params.gimbal
+        rotation = product(_chain(params.robot).factors(params.q))[:3, :3]
+        tool = lock_sine(params.sequence, gimbal.angles(rotation)[1])
+        phi, theta, psi = gimbal.angles(state.rotation)
+        nudged = gimbal.angles(gimbal.turn(NUDGE) @ state.rotation)
+        change = float(np.abs(_wrapped(nudged - (phi, theta, psi))).max())
         w, x, y, z = matrix_to_quaternion(state.rotation)  # w > 0: it never gets near a half turn
         return {
             "shown": float(params.shown(state.moved)),
@@ -304,30 +303,33 @@ class Kinematics(Lab[KinematicsParams, KinematicsState]):
             "determinant": float(np.linalg.det(rotation)),
             "tool_distance": float(np.arcsin(min(tool, 1.0))),
             "tool_law": _gain(tool),
-            "phi": angles[0],
-            "theta": angles[1],
-            "psi": angles[2],
+            "phi": phi,
+            "theta": theta,
+            "psi": psi,
             "qw": w,
             "qx": x,
             "qy": y,
             "qz": z,
-            "amplification": min(float(np.abs(change).max()) / NUDGE, HIGHEST),
-            "law": _gain(lock_sine(params.sequence, angles[1])),
+            "amplification": min(change / NUDGE, HIGHEST),
+            "law": _gain(lock_sine(params.sequence, theta)),
             "quaternion_gain": 0.5,
+            "rate": state.rate,
+            "speed": state.speed,
             "peak_rate": state.peak_rate,
             "peak_speed": state.peak_speed,
         }
 
     def fields(self, params: KinematicsParams, state: KinematicsState) -> Mapping[str, np.ndarray]:
         """The chain, and the end-effector's orientation in five ways."""
-        factors = chain(params.robot, params.q)
-        product = whole(factors)
-        rotation = product[:3, :3]
+        chain = _chain(params.robot)
+        factors = chain.factors(params.q)
+        pose = product(factors)
+        rotation = pose[:3, :3]
         angle, axis = matrix_to_angle_axis(rotation)
         return {
             "factor": factors[params.shown(state.moved) - 1],
-            "product": product,
-            "dependence": dependence(params.robot, params.q),
+            "product": pose,
+            "dependence": chain.dependence(params.q),
             "rotation": rotation,
             "euler": matrix_to_euler(params.sequence, rotation)[None],
             "rpy": matrix_to_rpy(rotation)[None],
@@ -343,7 +345,7 @@ class Kinematics(Lab[KinematicsParams, KinematicsState]):
         shown = params.shown(state.moved)
         placement = np.eye(4)
         scene.frame("frame 0", pin.SE3.Identity(), SMALL)
-        for i, factor in enumerate(chain(params.robot, q), start=1):
+        for i, factor in enumerate(_chain(params.robot).factors(q), start=1):
             placement = placement @ factor
             scene.frame(f"frame {i}", pin.SE3(placement), LARGE if i == shown else SMALL)
             if i == shown:
@@ -353,68 +355,22 @@ class Kinematics(Lab[KinematicsParams, KinematicsState]):
     def _draw_gimbal(self, scene: Scene, params: KinematicsParams, state: KinematicsState) -> None:
         """The axes of the three angles, the rings that carry the second and the third, and the
         direction that is lost where they lie in a plane."""
-        angles = matrix_to_euler(params.sequence, state.rotation)
-        first, second, third = euler_axes(params.sequence, angles).T
-        for name, radius, (u, v) in zip(
-            ("outer ring", "inner ring"), RINGS, ((first, second), (second, third)), strict=True
-        ):
-            circle = radius * (np.outer(np.cos(CIRCLE), u) + np.outer(np.sin(CIRCLE), v))
-            scene.trail(name, GIMBAL + circle, "reference" if name == "outer ring" else "actual")
-        for symbol, axis in zip("φθψ", (first, second, third), strict=True):
-            reach = 1.25 * RINGS[0] if symbol == "φ" else RINGS[symbol == "ψ"]
-            scene.label(symbol, symbol, GIMBAL + 1.15 * reach * axis)
-        scene.frame("body", pin.SE3(state.rotation, GIMBAL), 0.13)
-        scene.arrow(
-            "lost", GIMBAL, GIMBAL + 0.3 * lost_direction(params.sequence, angles[0]), "warning"
-        )
-
-
-def chain(robot: str, q: np.ndarray) -> list[np.ndarray]:
-    """The n factors H_i^(i-1)(q_i) (4, 4) at q (n,) [rad] (notes, 1.1.1). Frame 0 is the world,
-    frame i moves with joint i, and frame n is at the end-effector: [m] in the last columns."""
-    arm = load(robot)
-    data = _workspace(robot)
-    pin.forwardKinematics(arm.model, data, q)
-    factors = [data.liMi[i].homogeneous for i in range(1, arm.model.njoints)]
-    factors[-1] = factors[-1] @ arm.model.frames[arm.tip].placement.homogeneous
-    return factors
-
-
-def whole(factors: list[np.ndarray]) -> np.ndarray:
-    """H_n^0 = H_1^0 H_2^1 ... H_n^(n-1) (4, 4)."""
-    product = np.eye(4)
-    for factor in factors:
-        product = product @ factor
-    return product
-
-
-def dependence(robot: str, q: np.ndarray) -> np.ndarray:
-    """(n + 1, n): how much, by the Frobenius norm, each factor (a row) and their product (the last
-    row) change per radian of each joint (a column). Metres and pure numbers are added up: what
-    counts is what is zero."""
-    step = 1e-6
-    found = np.empty((len(q) + 1, len(q)))
-    for j, change in enumerate(step * np.eye(len(q))):
-        ahead, behind = chain(robot, q + change), chain(robot, q - change)
-        ahead.append(whole(ahead))
-        behind.append(whole(behind))
-        found[:, j] = np.linalg.norm(np.subtract(ahead, behind), axis=(1, 2)) / (2.0 * step)
-    return found
-
-
-def body(params: KinematicsParams, phase: float) -> np.ndarray:
-    """The orientation (3, 3) of the body in the gimbal: at its middle turned by the middle Euler
-    angle only, and from there by A sin(2 pi phase) about the axis of the wobble."""
-    middle = euler_to_matrix(params.sequence, np.array([0.0, params.middle, 0.0]))
-    turn = angle_axis_to_matrix(params.size * np.sin(2.0 * np.pi * phase), params.axis)
-    rotation: np.ndarray = turn @ middle
-    return rotation
+        gimbal, rotation = params.gimbal, state.rotation
+        outer, inner = gimbal.rings(rotation)
+        scene.trail("outer ring", GIMBAL + RINGS[0] * outer, "reference")
+        scene.trail("inner ring", GIMBAL + RINGS[1] * inner)
+        first, second, third = gimbal.axes(rotation)
+        for symbol, place in (("φ", 1.35 * first), ("θ", 1.2 * second), ("ψ", 1.15 * third)):
+            scene.label(symbol, symbol, GIMBAL + RINGS[0] * place)
+        scene.frame("body", pin.SE3(rotation, GIMBAL), 0.13)
+        lost = lost_direction(params.sequence, gimbal.angles(rotation)[0])
+        scene.arrow("lost", GIMBAL, GIMBAL + 0.28 * lost, "warning")
 
 
 @cache
-def _workspace(robot: str) -> pin.Data:
-    """Its contents mean nothing between calls."""
-    return load(robot).model.createData()
+def _chain(robot: str) -> FrameChain:
+    arm = load(robot)
+    return FrameChain(arm.model, arm.tip)
 
 
 def _wrapped(angles: np.ndarray) -> np.ndarray:

@@ -29,14 +29,14 @@ TRAIL, TRAIL_EVERY = 150, 2
 FULL_ARC, LONGEST_ARC = 4.5, 6.0
 """[rad] an arc at its torque limit spans, and spans at most."""
 CAMERA = {
-    "ur5": ((1.35, -1.35, 1.0), (0.2, 0.0, 0.4)),
-    "panda": ((1.4, -1.4, 1.1), (0.15, 0.0, 0.45)),
-    "double-pendulum": ((2.6, 0.9, 1.3), (0.0, 0.15, 1.05)),
+    "ur5": ((1.1, -0.95, 0.8), (0.25, 0.05, 0.42)),
+    "panda": ((1.1, -1.0, 0.9), (0.2, 0.03, 0.47)),
+    "double-pendulum": ((2.1, 0.6, 1.25), (0.0, 0.15, 1.1)),
 }
 DRIVES = {
-    "balanced": "Gravity balanced: g(q)",
-    "inverse": "Inverse dynamics of the accelerations",
-    "none": "None: free fall",
+    "balanced": "Gravity balanced",
+    "inverse": "Inverse dynamics",
+    "none": "Nothing: free fall",
 }
 STEPS = {0.0005: "0.5 ms", 0.001: "1 ms", 0.002: "2 ms", 0.005: "5 ms", 0.01: "10 ms"}
 
@@ -48,7 +48,7 @@ def _torque(joint: int) -> Any:
         30.0,
         symbol=f"\\tau_{joint}",
         unit="N·m",
-        label=f"Torque {joint}",
+        label=f"Joint {joint}",
         group="Torques",
         step=0.1,
         help="Added to what drives the joints. Without effect where there is no such joint.",
@@ -62,7 +62,7 @@ def _acceleration(joint: int, default: float = 0.0) -> Any:
         10.0,
         symbol=f"a_{joint}",
         unit="rad/s²",
-        label=f"Acceleration {joint}",
+        label=f"Joint {joint}",
         group="Accelerations asked for",
         step=0.1,
         help="Inverse dynamics finds the torque for it. Without effect where there is no such "
@@ -93,7 +93,7 @@ def _force(axis: str) -> Any:
         100.0,
         symbol=f"f_{axis}",
         unit="N",
-        label=f"Force along {axis}",
+        label=f"Force {axis}",
         group="External force",
         step=1.0,
         help="On the end-effector, in the world's axes: a wrench w without a moment.",
@@ -126,9 +126,10 @@ class DynamicsParams(Params):
     drive: str = choice(
         "inverse",
         DRIVES,
-        label="What drives the joints",
+        label="Drive",
         group="Torques",
-        help="The sliders of the torques add to it.",
+        help="What the motors do: carry the arm's weight g(q), what inverse dynamics says for the "
+        "accelerations asked for, or nothing. The sliders add to it.",
     )
     tau1: float = _torque(1)
     tau2: float = _torque(2)
@@ -160,12 +161,12 @@ class DynamicsParams(Params):
         2.0,
         0.5,
         10.0,
-        symbol="T",
+        symbol="T_a",
         unit="s",
         label="Period",
         group="Accelerations asked for",
         step=0.1,
-        help="The accelerations come and go as a cos(2 pi t / T), so that the arm stays near.",
+        help="The accelerations come and go as a cos(2 pi t / T_a), so that the arm stays near.",
     )
     fx: float = _force("x")
     fy: float = _force("y")
@@ -191,7 +192,7 @@ class DynamicsParams(Params):
         3.0,
         symbol="\\dot q(0)",
         unit="rad/s",
-        label="Velocity of every joint",
+        label="Velocity",
         group="Start",
         step=0.05,
         effect="restart",
@@ -229,7 +230,7 @@ class DynamicsParams(Params):
         )
 
     def accelerations(self, n: int, t: float) -> np.ndarray:
-        """a cos(2 pi t / T), (n,) [rad/s^2], asked for at t [s]."""
+        """a cos(2 pi t / T_a), (n,) [rad/s^2], asked for at t [s]."""
         asked = (self.a1, self.a2, self.a3, self.a4, self.a5, self.a6, self.a7)[:n]
         return cos(2 * pi * t / self.swing) * np.array(asked)
 
@@ -281,10 +282,10 @@ class Dynamics(Lab[DynamicsParams, DynamicsState]):
             "What the torque of a joint is spent on",
             "N·m",
             (
-                Line("inertia", r"(M \ddot q)"),
-                Line("coriolis", r"(C \dot q)"),
+                Line("inertia", r"M \ddot q"),
+                Line("coriolis", r"C \dot q"),
                 Line("gravity", "g"),
-                Line("applied", r"(\tau + J^T w)", "dash"),
+                Line("applied", r"\tau + J^T w", "dash"),
             ),
             select="joint",
             stacked=True,
@@ -306,10 +307,9 @@ class Dynamics(Lab[DynamicsParams, DynamicsState]):
         ),
         TimeSeries("Acceleration", "rad/s²", (Line("acceleration", r"\ddot q"),), select="joint"),
         TimeSeries("Velocity", "rad/s", (Line("v", r"\dot q"),), select="joint"),
-        Readout("there_and_back", "Inverse, then direct: |q̈ − a|", "rad/s²"),
-        Readout("back_and_there", "Direct, then inverse: difference of τ", "N·m"),
-        Readout("residual", "M q̈ + C q̇ + g − τ − Jᵀw", "N·m"),
-        Readout("least_inertia", "Least eigenvalue of M", "kg·m²"),
+        Readout("there_and_back", "Inverse, then direct", "rad/s²"),
+        Readout("back_and_there", "Direct, then inverse", "N·m"),
+        Readout("residual", "Left − right side", "N·m"),
         Readout("total", "Energy T + U", "J"),
         Readout("power", "Power τ·q̇ + w·v", "W"),
         Readout("drift", "Energy no work explains", "J"),

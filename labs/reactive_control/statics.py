@@ -13,11 +13,11 @@ from labs.models.plant import plant
 from labs.models.postures import POSTURES, ROBOTS, posture
 from labs.params import Params, Value, choice, knob
 from labs.plots import Bars, Line, Matrix, Readout, TimeSeries
-from labs.scene import Scene
+from labs.scene import Color, Scene
 
 ARROW = 1.0 / 600.0
 """[m/N] length of the force's arrow."""
-TWIST = 0.5
+TWIST = 0.6
 """[s] length of the velocity's arrow over the velocity."""
 STRONGEST = 500.0
 """[N] beyond which dragging pulls no harder."""
@@ -29,9 +29,9 @@ FULL_MOMENT = 40.0
 FEWEST = 1e-9
 """[N] forces below are none."""
 CAMERA = {
-    "ur5": ((1.75, -1.75, 1.25), (0.25, 0.0, 0.4)),
-    "panda": ((1.75, -1.75, 1.3), (0.25, 0.0, 0.45)),
-    "double-pendulum": ((2.6, 0.9, 1.3), (0.0, 0.3, 0.9)),
+    "ur5": ((1.05, -0.92, 0.8), (0.3, 0.05, 0.4)),
+    "panda": ((1.15, -1.05, 0.9), (0.3, 0.03, 0.5)),
+    "double-pendulum": ((1.6, 0.7, 1.15), (0.0, 0.38, 0.95)),
 }
 
 
@@ -57,7 +57,7 @@ def _speed(joint: int, default: float = 0.0) -> Any:
         2.0,
         symbol=f"\\dot q_{joint}",
         unit="rad/s",
-        label=f"Velocity of joint {joint}",
+        label=f"Joint {joint}",
         group="Velocity of the joints",
         step=0.01,
         help="The motion whose power is reckoned; the arm itself stays where it is.",
@@ -71,7 +71,7 @@ def _force(axis: str, default: float) -> Any:
         300.0,
         symbol=f"f_{axis}",
         unit="N",
-        label=f"Force along {axis}",
+        label=f"Force {axis}",
         group="Wrench at the end-effector",
         step=1.0,
         help="In the world's axes. What was dragged in the scene adds to it.",
@@ -85,7 +85,7 @@ def _moment(axis: str) -> Any:
         40.0,
         symbol=f"m_{axis}",
         unit="N·m",
-        label=f"Moment about {axis}",
+        label=f"Moment {axis}",
         group="Wrench at the end-effector",
         step=0.1,
         help="In the world's axes, drawn as an arc around the end-effector.",
@@ -119,9 +119,9 @@ class StaticsParams(Params):
     mx: float = _moment("x")
     my: float = _moment("y")
     mz: float = _moment("z")
-    dq1: float = _speed(1, 0.4)
-    dq2: float = _speed(2, -0.3)
-    dq3: float = _speed(3, 0.5)
+    dq1: float = _speed(1, -0.5)
+    dq2: float = _speed(2, 0.2)
+    dq3: float = _speed(3, -0.6)
     dq4: float = _speed(4)
     dq5: float = _speed(5)
     dq6: float = _speed(6)
@@ -203,22 +203,19 @@ class Statics(Lab[StaticsParams, StaticsState]):
             ),
         ),
         Matrix(
-            "Transposed Jacobian, six columns for force and moment",
+            "Transposed Jacobian",
             "transposed",
             "J(q)^T",
             shade=True,
         ),
-        Bars(
-            "Torque per force, in the three main directions", "per_force", r"\sigma_i(J_p)", "N·m/N"
-        ),
+        Bars("Torque per force, along each main direction", "per_force", r"\sigma_i(J_p)", "N·m/N"),
         TimeSeries("Torques over time", "N·m", (Line("tau", r"\tau"),), select="joint"),
         Readout("force", "Force |f|", "N"),
-        Readout("moment", "Moment |m|", "N·m"),
         Readout("effort", "Torque |τ|", "N·m"),
         Readout("joint_power", "Power at the joints", "W"),
         Readout("tip_power", "Power at the end-effector", "W"),
         Readout("power_gap", "Their difference", "W"),
-        Readout("arm_length", "|τ| per |f|, without the moment", "N·m/N"),
+        Readout("arm_length", "Torque per force", "N·m/N"),
     )
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Outstretched, pulled along itself": {
@@ -297,7 +294,7 @@ class Statics(Lab[StaticsParams, StaticsState]):
         for i, share in enumerate(tau / arm.torque_limit):
             if abs(angle := FULL_ARC * share) > 0.03:
                 angle = float(np.clip(angle, -LONGEST_ARC, LONGEST_ARC))
-                color = "warning" if abs(share) >= 1.0 else "force"
+                color: Color = "warning" if abs(share) >= 1.0 else "force"
                 axis = load.jacobian[3:, i]
                 scene.arc(f"torque {i + 1}", load.joints[i], axis, angle, 0.14, color)
         end = tip + ARROW * load.wrench[:3]
@@ -328,4 +325,4 @@ def _load(params: StaticsParams, state: StaticsState) -> Load:
 
 
 def _norm(vector: np.ndarray) -> float:
-    return float(vector @ vector) ** 0.5
+    return float(np.sqrt(vector @ vector))

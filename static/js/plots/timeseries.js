@@ -149,7 +149,7 @@ export class TimeSeries {
       if (limit > 0 && high > 0.6 * limit) high = Math.max(high, limit);
       if (limit < 0 && low < 0.6 * limit) low = Math.min(low, limit);
     }
-    const least = Math.max(1e-6, 1e-4 * Math.max(Math.abs(low), Math.abs(high)));
+    const least = Math.max(1e-6, 1e-3 * Math.max(Math.abs(low), Math.abs(high)));
     const middle = (low + high) / 2;
     const half = Math.max((high - low) / 2, least);
     const wanted = [middle - 1.08 * half, middle + 1.08 * half];

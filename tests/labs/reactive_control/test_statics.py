@@ -29,6 +29,11 @@ def start(params: StaticsParams) -> StaticsState:
     return LAB.init(params, np.random.default_rng(0))
 
 
+def forced(params: StaticsParams, state: StaticsState) -> np.ndarray:
+    """The force on the end-effector (3,) [N]."""
+    return np.asarray(LAB.measure(params, state)["wrench"])[:3]
+
+
 def at(setting: Mapping[str, Value], **changes: Value) -> Row:
     """All that is measured at the start."""
     params = with_(setting, **changes)
@@ -182,14 +187,14 @@ def test_the_force_follows_the_handle_and_stays() -> None:
     hand = tuple(tip + ARROW * np.array([0.0, 90.0, 120.0]))
     state = start(params)
     held = LAB.step(params, Inputs(handles={"pull": hand}), state)
-    assert LAB.measure(params, held)["wrench"][:3] == pytest.approx([0, 90, 120], abs=1e-9)
+    assert forced(params, held) == pytest.approx([0, 90, 120], abs=1e-9)
     released = LAB.step(params, Inputs(), held)
     np.testing.assert_array_equal(released.pulled, held.pulled)
     # A slider then adds to what was dragged.
     more = params.change({"fx": params.fx + 10.0})
-    assert LAB.measure(more, released)["wrench"][:3] == pytest.approx([10, 90, 120], abs=1e-9)
+    assert forced(more, released) == pytest.approx([10, 90, 120], abs=1e-9)
     gone = LAB.step(params, Inputs(actions=("let_go",)), released)
-    np.testing.assert_array_equal(LAB.measure(params, gone)["wrench"][:3], params.force)
+    np.testing.assert_array_equal(forced(params, gone), params.force)
 
 
 def test_dragging_pulls_no_harder_than_it_may() -> None:

@@ -33,11 +33,11 @@ WORST_CONDITION = 1e6
 """Shown for any condition number beyond it."""
 AXIS, COLUMN, TWIST = 0.3, 0.4, 0.8
 """[m] length of an axis; of a column of J_p per m/rad; of the velocity per m/s."""
-VELOCITY_BALL, FORCE_BALL, LONGEST = 0.25, 0.06, 0.8
+VELOCITY_BALL, FORCE_BALL, LONGEST = 0.25, 0.06, 0.4
 """[m] per unit singular value of J_p, and of its inverse; longest half-axis drawn."""
 
-NEARER = 0.8
-"""Times the arm's usual distance: where the camera stands."""
+CAMERA = ((0.92, 1.0, 0.87), (0.36, 0.08, 0.4))
+"""Where a viewer stands and what it looks at [m]: reaching arms stay in view."""
 UP = np.array([0.0, 0.0, 1.0])
 
 ROBOTS = {"ur5": "UR5", "panda": "Franka Panda", "scara": "SCARA"}
@@ -153,7 +153,8 @@ class DifferentialParams(Params):
         label="Task",
         group="Inverse kinematics",
         effect="restart",
-        help="What must follow the target, the position alone or the orientation too; singular values are those of its rows of J.",
+        help="What must follow the target, the position alone or the orientation too; singular "
+        "values are those of its rows of J.",
     )
     method: str = choice(
         "damped",
@@ -278,7 +279,7 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         TimeSeries(
             "Distance to singularity",
             "",
-            (Line("sigma_min", r"\sigma_{min}"), Line("near", "0.05", "limit")),
+            (Line("sigma_min", r"\sigma_{min}"), Line("near", r"\text{warning}", "limit")),
         ),
         TimeSeries(
             "Joint speed",
@@ -412,8 +413,7 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         chain = _kinematics(params.robot, params.frame).at(q)
         jacobian = geometric(chain)
         tip = chain.placement.translation
-        position, look_at = map(np.array, params.arm.camera)
-        scene.camera(look_at + NEARER * (position - look_at), look_at)
+        scene.camera(*CAMERA)
         scene.arm("robot", params.arm, q)
         scene.frame("frame", chain.placement, 0.12)
         _draw_columns(scene, params.columns, chain, jacobian)
@@ -504,7 +504,7 @@ def _draw_twist(scene: Scene, tip: np.ndarray, twist: np.ndarray) -> None:
         scene.arrow("velocity", tip, tip + linear, "reference")
     omega = float(np.linalg.norm(angular))
     if omega > 0.02:
-        scene.arc("angular velocity", tip, angular, min(2.0 * omega, 5.5), 0.1, "reference")
+        scene.arc("angular velocity", tip, angular, min(2.0 * omega, 5.5), 0.15, "reference")
 
 
 def _draw_ellipsoids(scene: Scene, which: str, tip: np.ndarray, linear: np.ndarray) -> None:

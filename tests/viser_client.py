@@ -98,6 +98,11 @@ class SceneClient:
             self.read_until(lambda _: label in self.controls)
         return self.controls[label]
 
+    def wait_for_node(self, name: str) -> None:
+        """Waits until the scene has a node of this name; a drag of none is dropped."""
+        if name not in self.nodes:
+            self.read_until(lambda _: name in self.nodes)
+
     def shows(self, label: str, value: Any) -> None:
         """Waits until a control shows a value. Fails after 20 s."""
         uuid = self.control(label)

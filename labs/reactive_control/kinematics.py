@@ -33,7 +33,10 @@ HIGHEST = 1000.0
 """What is larger, up to infinity at the lock, is shown as this."""
 SMALL, LARGE = 0.12, 0.25
 """[m] length of a frame's axes, and of the highlighted frame's."""
-CAMERA = ((0.82, -0.88, 0.7), (0.1, -0.13, 0.3))
+CAMERAS = {
+    "ur5": ((0.82, -0.88, 0.7), (0.1, -0.13, 0.3)),
+    "panda": ((1.0, -1.1, 0.95), (0.1, -0.13, 0.44)),
+}
 GIMBAL = np.array([-0.2, -0.45, 0.36])
 """[m] where the body in the gimbal is."""
 RINGS = (0.2, 0.17)
@@ -231,7 +234,6 @@ class Kinematics(Lab[KinematicsParams, KinematicsState]):
         Readout("shown", "Factor shown, i", "", whole=True),
         Readout("orthogonality", "‖RᵀR − I‖", ""),
         Readout("determinant", "det R", ""),
-        Readout("tool_distance", "End-effector: distance from the lock", "rad"),
         Readout("tool_law", "End-effector: worst amplification", ""),
         Readout("peak_rate", "Gimbal: fastest Euler angle", "rad/s"),
         Readout("peak_speed", "Gimbal: fastest rotation", "rad/s"),
@@ -301,7 +303,6 @@ class Kinematics(Lab[KinematicsParams, KinematicsState]):
             "shown": float(params.shown(state.moved)),
             "orthogonality": float(np.linalg.norm(rotation.T @ rotation - np.eye(3))),
             "determinant": float(np.linalg.det(rotation)),
-            "tool_distance": float(np.arcsin(min(tool, 1.0))),
             "tool_law": _gain(tool),
             "phi": phi,
             "theta": theta,
@@ -340,7 +341,7 @@ class Kinematics(Lab[KinematicsParams, KinematicsState]):
     def draw(self, scene: Scene, params: KinematicsParams, state: KinematicsState) -> None:
         """The arm and its frames, the shown factor's highlighted, and the body in its gimbal."""
         arm, q = load(params.robot), params.q
-        scene.camera(*CAMERA)
+        scene.camera(*CAMERAS[params.robot])
         scene.arm("robot", arm, q, ghost=params.translucent)
         shown = params.shown(state.moved)
         placement = np.eye(4)

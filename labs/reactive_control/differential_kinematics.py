@@ -246,7 +246,7 @@ class DifferentialState(State):
     asked: np.ndarray
     """(n,) [rad/s] what inverse kinematics asked for."""
     given: np.ndarray
-    """(n,) [rad/s] the same within the speed limit."""
+    """(n,) [rad/s] what of it the motors and end stops let through."""
     wanted: float = 0.0
     """|v| of the task velocity [m/s, with rad/s]."""
     anchor: np.ndarray
@@ -347,6 +347,7 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         elif params.mode == "velocity":
             asked = params.rates
         given = slowed(asked, params.fastest) if params.mode == "follow" else asked
+        given = _within_stops(params.arm, q, given)
         model = params.arm.model
         speed = float(np.linalg.norm(asked))
         return DifferentialState(
@@ -448,7 +449,21 @@ def _posture(params: DifferentialParams, state: DifferentialState) -> np.ndarray
 
 def _rates(params: DifferentialParams, state: DifferentialState) -> np.ndarray:
     """(n,) [rad/s; m/s] the joint velocities the twist belongs to."""
-    return state.given if params.mode == "follow" else params.rates
+    match params.mode:
+        case "follow":
+            return state.given
+        case "velocity":
+            return _within_stops(params.arm, _posture(params, state), params.rates)
+        case _:
+            return params.rates
+
+
+def _within_stops(arm: Arm, q: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """`rates` (n,) but zero where a joint stands at its end stop and would go on."""
+    model = arm.model
+    stuck = (q >= model.upperPositionLimit) & (rates > 0.0)
+    stuck |= (q <= model.lowerPositionLimit) & (rates < 0.0)
+    return np.where(stuck, 0.0, rates)
 
 
 def _target(

@@ -1,4 +1,4 @@
-"""Rings at joints near their limit: about the axis of a joint that turns, around one that slides."""
+"""Rings at joints near their limit: about a joint's axis, whether it turns or slides."""
 
 from unittest.mock import MagicMock
 

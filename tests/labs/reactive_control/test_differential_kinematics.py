@@ -313,6 +313,9 @@ def test_joints_stay_within_their_limits() -> None:
     *_, end = states(params, 4.0)
     limits = params.arm.model.lowerPositionLimit, params.arm.model.upperPositionLimit
     np.testing.assert_array_equal(end.q[:3], [limits[1][0], limits[0][1], limits[1][2]])
+    assert not LAB.fields(params, end)["twist"].any(), "at its end stops it stands still"
+    back = LAB.fields(params.change({"dq3": -0.5}), end)["twist"][:, 0]
+    np.testing.assert_array_equal(back, [0, 0, -0.5, 0, 0, 0])
     posed = with_({"robot": "scara"}, lift=0.05, q3=2.0, q2=3.14).posture
     np.testing.assert_allclose(posed, [-0.4, 2.6, 0.05, -0.8])
 

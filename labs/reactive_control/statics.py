@@ -119,9 +119,9 @@ class StaticsParams(Params):
     mx: float = _moment("x")
     my: float = _moment("y")
     mz: float = _moment("z")
-    dq1: float = _speed(1, -0.5)
-    dq2: float = _speed(2, 0.2)
-    dq3: float = _speed(3, -0.6)
+    dq1: float = _speed(1, -0.3)
+    dq2: float = _speed(2, 0.5)
+    dq3: float = _speed(3, -1.0)
     dq4: float = _speed(4)
     dq5: float = _speed(5)
     dq6: float = _speed(6)
@@ -191,7 +191,7 @@ class Statics(Lab[StaticsParams, StaticsState]):
         "powers that must be equal, and the direction in which an arm carries for nothing."
     )
     Params = StaticsParams
-    period = 0.02
+    period = 0.01
     plots = (
         Bars("Joint torques", "torque", r"\tau = J^T w", "N·m", limit="torque_limit"),
         TimeSeries(

@@ -80,16 +80,15 @@ def boundary(r: StabilityFunction, reach: float = 8.0, points: int = 240) -> np.
     p, q = (np.pad(c, (0, degree + 1 - len(c))) for c in (r.p, r.q))
     angles = np.linspace(0.0, 2.0 * np.pi, points)[:-1] + 1e-6
     sheets = [np.roots((p - np.exp(1j * angle) * q)[::-1]) for angle in angles]
-    edge = [sheets[0][np.argmin(np.abs(sheets[0]))]]
-    for _ in range(degree):
-        for roots in sheets[1:]:
-            edge.append(_next(edge, roots))
-        edge.append(_next(edge, sheets[0]))
-        if abs(edge[-1] - edge[0]) < ROUNDING * (1.0 + abs(edge[0])):
+    edge = [complex(sheets[0][np.argmin(np.abs(sheets[0]))])]
+    for roots in [*sheets[1:], sheets[0]] * degree:
+        edge.append(_next(edge, roots))
+        if abs(edge[-1]) > reach:  # the other half is its mirror image
+            half = np.array(edge[:-1])
+            return np.concatenate([half[::-1].conj(), half])
+        if roots is sheets[0] and abs(edge[-1] - edge[0]) < ROUNDING:
             break
-    found = np.array(edge)
-    kept: np.ndarray = found[np.abs(found) <= reach]
-    return kept
+    return np.array(edge)
 
 
 def measured_limit(growth: Callable[[float], float], lowest: float, highest: float) -> float:

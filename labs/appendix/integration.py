@@ -57,10 +57,10 @@ IMPLICIT = {
 }
 REFERENCE = gauss_legendre(3)
 """Order 6, with steps of 10 ms: what the others are compared with in the scene."""
-SPACING = 0.26
-"""[m] between two pendulums on their axle."""
-FASTEST = 60.0
-"""[rad/s] a pendulum faster than this has blown up: falling makes 8."""
+SPACING = (-0.05, 0.36, 0.0)
+"""[m] from the hinge of one pendulum to the next: behind and beside it."""
+FASTEST = 40.0
+"""[rad/s] a pendulum faster than this has blown up; one that falls from upright makes 11."""
 DURATION, COUNTS = 0.5, (10, 20, 40, 80, 160, 320)
 """[s] and numbers of steps of the study of errors."""
 LADDER = DURATION / np.array(COUNTS)
@@ -199,11 +199,11 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
     period = 0.01
     plots = (
         TimeSeries(
-            "Angle of the first rod",
-            "rad",
+            "Sideways position of the tip",
+            "m",
             (
-                *(Line(f"angle_{m}", rf"\text{{{name}}}") for m, name in METHODS.items()),
-                Line("angle", r"\text{exact}", "limit"),
+                *(Line(f"tip_{m}", rf"\text{{{name}}}") for m, name in METHODS.items()),
+                Line("tip", r"\text{exact}", "limit"),
             ),
         ),
         TimeSeries(
@@ -366,29 +366,29 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
         )
 
     def measure(self, params: IntegrationParams, state: IntegrationState) -> Measurement:
-        plant, own = params.plant, parse(params.tableau)
+        plant, own = params.plant, _tableau(params.tableau)
         fall = plant.energy(np.eye(2 * params.rods)[0] * np.pi)
         begun = plant.energy(params.x0())
         measured: dict[str, float | np.ndarray] = {
-            "angle": float(state.reference[0]),
+            "tip": float(_tip(state.reference[: params.rods])[1]),
             "energy": plant.energy(state.reference),
             "own_order": float(order(own)),
             "own_sum": float(own.b.sum()),
-            "reach": params.h * float(np.abs(plant.eigenvalues()).max()),
+            "reach": params.h * float(np.abs(plant.eigenvalues).max()),
             "newton": float(state.newton),
             "going": float(len(NAMES) - state.stopped.sum()),
         }
         for x, name in zip(state.x, NAMES, strict=True):
             energy = plant.energy(x)
-            measured[f"angle_{name}"] = float(x[0])
+            measured[f"tip_{name}"] = float(_tip(x[: params.rods])[1])
             measured[f"energy_{name}"] = energy
-            measured[f"drift_{name}"] = float(np.log10(max(abs(energy - begun) / fall, 1e-16)))
+            measured[f"drift_{name}"] = float(np.log10(max(abs(energy - begun) / fall, 1e-12)))
         return measured
 
     def fields(
         self, params: IntegrationParams, state: IntegrationState
     ) -> Mapping[str, np.ndarray]:
-        z = params.h * params.plant.eigenvalues()
+        z = params.h * params.plant.eigenvalues
         found: dict[str, np.ndarray] = {
             "ladder": LADDER,
             "grid": GRID,
@@ -396,7 +396,7 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
             "all": np.array([0.0, HIGHEST]),
             "z_re": z.real,
             "z_im": z.imag,
-            "conditions": order_conditions(parse(params.tableau)),
+            "conditions": order_conditions(_tableau(params.tableau)),
         }
         for i, name in enumerate(NAMES):
             errors, local = state.global_errors[i], state.local_errors[i]
@@ -418,26 +418,24 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
         return found
 
     def draw(self, scene: Scene, params: IntegrationParams, state: IntegrationState) -> None:
-        """The pendulums on one axle, the exact one in front, a line from its tip past all."""
-        rods = params.rods
-        top = 0.3 + 0.5 * rods
-        scene.camera((1.9 + 0.8 * rods, 1.15 + 0.5 * rods, 0.45 + 0.75 * rods), (0, 0, 0.8 * top))
-        places = SPACING * (np.arange(len(NAMES) + 1) - len(NAMES) / 2)[::-1]
-        ends = np.array([places[0], places[-1]])
-        line = np.zeros((2, 3))
-        line[:, 0], line[:, 2] = ends, top
-        scene.trail("axle", line, "muted")
-        scene.trail("exact", line + _tip(state.reference[:rods]), "reference")
-        scene.arm("pendulum exact", hanging(rods, float(places[0]), GRAY), state.reference[:rods])
-        scene.label("name exact", "Exact", (places[0], 0.0, top + 0.1))
+        """The pendulums in echelon, the exact one in front, and a line through all the places
+        where its tip would be."""
+        rods, top = params.rods, 0.25 + LENGTH * params.rods
+        scene.camera((1.3 + 0.65 * rods, 0.0, 0.4 + 0.5 * rods), (0.0, 0.0, 0.15 + 0.35 * rods))
+        many = len(NAMES) + 1
+        hinges = np.outer(np.arange(many) - (many - 1) / 2, SPACING)
+        hinges[:, 2] = top
+        scene.trail("beam", hinges, "muted")
+        scene.trail("exact", hinges + _tip(state.reference[:rods]), "reference")
+        scene.arm("pendulum exact", hanging(rods, _xy(hinges[0]), GRAY), state.reference[:rods])
+        scene.label("name exact", "Exact", hinges[0] + [0.0, 0.0, 0.1])
         for i, (name, title) in enumerate(METHODS.items()):
-            x = float(places[i + 1])
-            q, stopped = state.x[i, :rods], bool(state.stopped[i])
-            scene.arm(f"pendulum {name}", hanging(rods, x, COLORS[i]), q)
-            height = top + (0.1, 0.18)[(i + 1) % 2]
-            scene.label(f"name {name}", f"{title} ✗" if stopped else title, (x, 0.0, height))
-            if stopped:
-                scene.sphere(f"lost {name}", np.array([x, 0.0, top]) + _tip(q), 0.06, "warning")
+            q, lost, hinge = state.x[i, :rods], bool(state.stopped[i]), hinges[i + 1]
+            scene.arm(f"pendulum {name}", hanging(rods, _xy(hinge), COLORS[i]), q)
+            above = [0.0, 0.0, (0.16, 0.1)[i % 2]]
+            scene.label(f"name {name}", f"{title} ✗" if lost else title, hinge + above)
+            if lost:
+                scene.sphere(f"lost {name}", hinge + _tip(q), 0.06, "warning")
 
 
 def _key(name: str, params: IntegrationParams) -> tuple[str, int, float]:
@@ -522,7 +520,7 @@ def _growth(text: str, rods: int, friction: float) -> np.ndarray:
             steps.append(np.abs(np.linalg.eigvals(drift @ kick)).max())
         found = np.array(steps)
     else:
-        found = StabilityFunction.of(_tableau(text)).growth(GRID, plant.eigenvalues())
+        found = StabilityFunction.of(_tableau(text)).growth(GRID, plant.eigenvalues)
     capped: np.ndarray = np.minimum(np.nan_to_num(found, nan=HIGHEST), HIGHEST)
     return capped
 
@@ -542,6 +540,10 @@ def _with(rows: np.ndarray, i: int, row: np.ndarray | float) -> np.ndarray:
     new = rows.copy()
     new[i] = row
     return new
+
+
+def _xy(point: np.ndarray) -> tuple[float, float]:
+    return float(point[0]), float(point[1])
 
 
 def _tip(q: np.ndarray) -> np.ndarray:

@@ -5,11 +5,11 @@ With viscous friction b [N m s/rad] at every hinge and no motor,
     M(q) q'' + h(q, q') = -b q',    x = (q, v),    x' = f(x) = (v, M^-1 (-b v - h))
 
 One rod of mass m and length L is the pendulum q'' = -(3 g / 2 L) sin q - (3 b / m L^2) q'.
-All rods: 0.5 m, 2 kg, radius 0.02 m. At q = 0 they hang; they swing in planes x = const.
+All rods: 0.5 m, 2 kg, radius 0.02 m. At q = 0 they hang; they swing in vertical planes x = const.
 """
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -63,9 +63,14 @@ class Pendulum:
         n = len(x) // 2
         kinetic = pin.computeKineticEnergy(self.model, self.data, x[:n], x[n:])
         potential = pin.computePotentialEnergy(self.model, self.data, x[:n])
-        lowest = pin.computePotentialEnergy(self.model, self.data, np.zeros(n))
-        return float(kinetic + potential - lowest)
+        return float(kinetic + potential - self.lowest)
 
+    @cached_property
+    def lowest(self) -> float:
+        """Potential energy [J] at rest at x = 0, by Pinocchio's zero."""
+        return float(pin.computePotentialEnergy(self.model, self.data, np.zeros(self.model.nv)))
+
+    @cached_property
     def eigenvalues(self) -> np.ndarray:
         """(2 nv,) complex [1/s]: lambda of df/dx at rest at x = 0."""
         values: np.ndarray = np.linalg.eigvals(self.jacobian(np.zeros(2 * self.model.nv), 0.0))
@@ -80,14 +85,13 @@ def pendulum(rods: int, friction: float = 0.0) -> Pendulum:
 
 
 @cache
-def hanging(rods: int, x: float = 0.0, color: Vector3 = GRAY) -> Arm:
-    """The same as a robot to draw, hung up at (x, 0, 0.3 + rods L) [m]."""
+def hanging(rods: int, place: tuple[float, float] = (0.0, 0.0), color: Vector3 = GRAY) -> Arm:
+    """The same as a robot to draw, hung up at (*place, 0.25 + rods L) [m]."""
     model = pin.Model()
     model.name = f"pendulum{rods}"
     middle = _shift(0.0, 0.0, -LENGTH / 2)
-    parent, hinge = 0, _shift(x, 0.0, 0.3 + rods * LENGTH)
-    block = hinge * _shift(0.0, 0.0, 0.0)
-    visuals = [_piece(0, block, Box((0.07, 0.1, 0.06)), GRAY)]
+    parent, hinge = 0, _shift(*place, 0.25 + rods * LENGTH)
+    visuals = [_piece(0, hinge, Box((0.05, 0.07, 0.05)), GRAY)]
     for rod in range(rods):
         parent = model.addJoint(parent, pin.JointModelRX(), hinge, f"hinge{rod + 1}")
         model.appendBodyToJoint(parent, pin.Inertia.FromCylinder(MASS, RADIUS, LENGTH), middle)

@@ -196,3 +196,16 @@ def test_every_kind_of_plot_draws(page: Page) -> None:
     expect(page.locator("#plots .js-plotly-plot")).to_be_visible(timeout=20_000)
     expect(page.locator("#plots table")).to_contain_text(re.compile(r"-?\d\.\d"))
     screenshot(page, "plots")
+
+
+def test_a_shaded_matrix_shows_size_and_sign(page: Page) -> None:
+    """Its entries are [x, 1; 1, -x]: one tone for both ones, two for x and -x."""
+    LabPage(page).open("oscillator")
+    expect(page.locator("#plots table")).to_contain_text(re.compile(r"\d"))
+    page.wait_for_function(
+        """() => {
+          const tones = [...document.querySelectorAll("#plots .shaded td")]
+            .map((cell) => getComputedStyle(cell).backgroundColor);
+          return tones.length === 4 && tones[1] === tones[2] && new Set(tones).size === 3;
+        }"""
+    )

@@ -291,6 +291,7 @@ def test_through_the_lock(setting: Mapping[str, Value]) -> None:
     for name in ("phi", "psi"):
         sizes = np.abs(np.diff(channels[name]))[jumps[0]]
         np.testing.assert_allclose(sizes, np.pi, rtol=1e-12)
+    np.testing.assert_allclose(channels["amplification"], 1.0, rtol=1e-5)
     assert channels["peak_speed"][-1] * LAB.period < 0.002
     quaternions = np.column_stack([channels[name] for name in ("qw", "qx", "qy", "qz")])
     assert np.abs(np.diff(quaternions, axis=0)).max() < 0.001

@@ -110,6 +110,8 @@ class Live:
         except Exception as broken:
             error = self._fail(broken)
         if item.ref is not None:
+            # The status goes first: who has the answer finds the session as it is now.
+            self._status(time.perf_counter())
             self.link.send(CONTROL, {"ref": item.ref, "answer": answer, "error": error})
         self._urgent = True
         self._due["status"] = 0.0
@@ -290,7 +292,8 @@ class Live:
             )
 
     def _status(self, now: float) -> None:
-        self._pace.append((now, self.world.t))
+        if not self._pace or now - self._pace[-1][0] > 0.9 * STATUS_EVERY:
+            self._pace.append((now, self.world.t))
         (w0, t0), (w1, t1) = self._pace[0], self._pace[-1]
         factor = (t1 - t0) / (w1 - w0) if w1 > w0 else self.speed
         measuring = self._moving and w1 - w0 >= 2 * STATUS_EVERY

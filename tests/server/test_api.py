@@ -65,6 +65,15 @@ def test_commands_do_what_they_say(served: Served) -> None:
         stream.next("telemetry", lambda m: m["rows"] and m["rows"][-1][5] == 1.0)
 
 
+def test_an_answer_comes_after_what_it_answers(served: Served) -> None:
+    """Whoever has the answer to a command finds the session changed."""
+    with served.session("oscillator") as session:
+        for k in range(20):
+            session.command("apply", params={"omega": 1.0 + 0.25 * k})
+            found = served.http.get(session.path).json()
+            assert found["params"]["omega"] == 1.0 + 0.25 * k
+
+
 def test_a_restart_parameter_restarts(served: Served) -> None:
     with served.session("oscillator") as session, session.stream() as stream:
         first = stream.next("status", lambda s: s["t"] > 0.2)

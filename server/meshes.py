@@ -1,5 +1,5 @@
-"""Robot meshes as the scene wants them: glTF with materials, or bare triangles. Cached, so that a
-worker forked from a process that has loaded them finds them in memory."""
+"""Shapes as the scene wants them: glTF with materials, bare triangles, segments of lines. Meshes
+are cached, so that a worker forked from a process that has loaded them finds them in memory."""
 
 from functools import cache
 from typing import Any
@@ -33,6 +33,20 @@ def torus(radius: float, thickness: float) -> Triangles:
 def ball() -> Triangles:
     """A ball of radius 1."""
     return _arrays(trimesh.creation.icosphere(3, 1.0))
+
+
+def arc_with_head(center: np.ndarray, axis: np.ndarray, angle: float, radius: float) -> np.ndarray:
+    """Segments (k, 2, 3) of an arc about `axis`, with an arrow's head where it ends."""
+    axis = axis / np.linalg.norm(axis)
+    x = np.cross(axis, [0.0, 0.0, 1.0] if abs(axis[2]) < 0.9 else [1.0, 0.0, 0.0])
+    x /= np.linalg.norm(x)
+    y = np.cross(axis, x)
+    turns = np.linspace(0.0, angle, 25)
+    points = center + radius * (np.outer(np.cos(turns), x) + np.outer(np.sin(turns), y))
+    back = turns[-1] - np.sign(angle) * min(0.3, abs(angle) / 2)
+    barbs = [r * (np.cos(back) * x + np.sin(back) * y) for r in (0.85 * radius, 1.15 * radius)]
+    head = [[points[-1], center + barb] for barb in barbs]
+    return np.concatenate([np.stack([points[:-1], points[1:]], 1), head]).astype(np.float32)
 
 
 @cache

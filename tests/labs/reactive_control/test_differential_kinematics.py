@@ -221,7 +221,7 @@ def test_damping_tames_it(setting: Mapping[str, Value]) -> None:
     assert speed[350:450].max() < 0.25, "it rests"
     exact = channel(with_(setting, method="pseudo-inverse"), "error", 8.0)
     assert error.max() == pytest.approx(0.09, abs=0.005)
-    assert error.max() <= exact.max() == pytest.approx(0.1, abs=0.005)
+    assert error.max() <= exact.max() < 0.12
     assert 1e3 * error[250] == pytest.approx(12, abs=0.5)
     assert 1e3 * exact[250] == pytest.approx(0.2, abs=0.02)
     heavy = channel(with_(setting, damping=0.5), "error", 8.0)

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from labs.models.arms import load
 from server.messages import View
-from server.viser_scene import _ArmNode
+from server.nodes import ArmNode
 
 
 @pytest.mark.parametrize(
@@ -18,7 +18,7 @@ from server.viser_scene import _ArmNode
 def test_a_ring_stands_across_its_joints_axis(robot: str, axes: str) -> None:
     server = MagicMock()
     arm = load(robot)
-    node = _ArmNode(server, "robot", arm, False, View(graphics="low"))
+    node = ArmNode(server, "robot", arm, False, View(graphics="low"))
     node.rings(np.ones(arm.model.nv))
     calls = server.scene.add_mesh_simple.call_args_list
     rings = [call for call in calls if call.args[0].endswith("/ring")]

@@ -71,7 +71,7 @@ def largest_step(r: StabilityFunction, eigenvalues: np.ndarray) -> float:
     return min((_along(r, value) for value in eigenvalues if abs(value) > 0.0), default=np.inf)
 
 
-def boundary(r: StabilityFunction, reach: float = 8.0, points: int = 240) -> np.ndarray:
+def boundary(r: StabilityFunction, reach: float, points: int = 240) -> np.ndarray:
     """Complex points in order along the edge |R(z)| = 1 that passes through z = 0, as far as
     |z| <= reach: the roots of P - e^(i theta) Q followed from theta = 0 until they return."""
     degree = max(len(r.p), len(r.q)) - 1

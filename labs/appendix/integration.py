@@ -2,32 +2,27 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import field_validator
 
-from labs.algorithms.absolute_stability import (
-    StabilityFunction,
-    boundary,
-    measured_limit,
-    spectral_radius,
-)
-from labs.algorithms.convergence import Stepper, exact, global_errors, local_errors, slope
-from labs.algorithms.integrators import semi_implicit_euler
-from labs.algorithms.runge_kutta import (
-    TABLEAUS,
-    Step,
-    Tableau,
-    gauss_legendre,
-    order,
-    order_conditions,
-    parse,
-    step,
-)
+from labs.algorithms.convergence import slope
+from labs.algorithms.runge_kutta import gauss_legendre, order, order_conditions, parse, step
 from labs.errors import LabError
 from labs.lab import Inputs, Lab, Measurement, Snapshot, State
+from labs.models.pendulum_study import (
+    COUNTS,
+    GRID,
+    HIGHEST,
+    LADDER,
+    LONGEST,
+    edge_of,
+    errors_and_limit,
+    growth_of,
+    stepper_of,
+    tableau_of,
+)
 from labs.models.pendulums import GRAY, LENGTH, Pendulum, hanging, pendulum
 from labs.params import Params, Value, choice, knob, text
 from labs.plots import Bars, Curves, Line, Readout, TimeSeries, Trace
@@ -61,14 +56,6 @@ SPACING = (-0.05, 0.36, 0.0)
 """[m] from the hinge of one pendulum to the next: behind and beside it."""
 FASTEST = 40.0
 """[rad/s] a pendulum faster than this has blown up; one that falls from upright makes 11."""
-DURATION, COUNTS = 0.5, (10, 20, 40, 80, 160, 320)
-"""[s] and numbers of steps of the study of errors."""
-LADDER = DURATION / np.array(COUNTS)
-LOCAL_FROM = 0.2
-"""[s] where the local errors are taken: in mid-swing."""
-LONGEST, SMALL, HIGHEST = 2.0, 1e-4, 2.5
-"""The search for the limit: longest step [s], size of the deviation; and the growth shown."""
-GRID = np.geomspace(0.02, LONGEST, 160)
 
 
 class IntegrationParams(Params):
@@ -186,6 +173,34 @@ class IntegrationState(State):
     """(8,) [s] largest step that does not blow up; -1 while unknown, LONGEST where none does."""
 
 
+def _lines(channel: str) -> tuple[Line, ...]:
+    """One for each method."""
+    return tuple(Line(f"{channel}_{m}", rf"\text{{{name}}}") for m, name in METHODS.items())
+
+
+def _traces(
+    x: str, y: str, style: Literal["line", "marked", "points"], note: str = ""
+) -> tuple[Trace, ...]:
+    """One for each method, in its colour; the grids are common to all."""
+    return tuple(
+        Trace(
+            x if x in {"ladder", "grid"} else f"{x}_{m}",
+            f"{y}_{m}",
+            name,
+            style,
+            i + 1,
+            f"{note}_{m}" if note else "",
+        )
+        for i, (m, name) in enumerate(METHODS.items())
+    )
+
+
+def _errors(title: str, x: str, y: str, note: str) -> Curves:
+    """Errors over steps or costs, doubly logarithmic."""
+    label = "step h [s]" if x == "ladder" else "evaluations of f in half a second"
+    return Curves(title, _traces(x, y, "marked", note), label, "error", log_x=True, log_y=True)
+
+
 class Integration(Lab[IntegrationParams, IntegrationState]):
     """Eight ways to integrate one motion."""
 
@@ -202,59 +217,23 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
             "Sideways position of the tip",
             "m",
             (
-                *(Line(f"tip_{m}", rf"\text{{{name}}}") for m, name in METHODS.items()),
+                *_lines("tip"),
                 Line("tip", r"\text{exact}", "limit"),
             ),
         ),
         TimeSeries(
             "Energy drift, decades",
             "log₁₀ of a fall's energy",
-            tuple(Line(f"drift_{m}", rf"\text{{{name}}}") for m, name in METHODS.items()),
+            _lines("drift"),
         ),
-        Curves(
-            "Global error after half a second",
-            tuple(
-                Trace("ladder", f"global_{m}", name, "marked", i + 1, f"order_{m}")
-                for i, (m, name) in enumerate(METHODS.items())
-            ),
-            "step h [s]",
-            "error",
-            log_x=True,
-            log_y=True,
-        ),
-        Curves(
-            "Local error of one step",
-            tuple(
-                Trace("ladder", f"local_{m}", name, "marked", i + 1, f"local_order_{m}")
-                for i, (m, name) in enumerate(METHODS.items())
-            ),
-            "step h [s]",
-            "error",
-            log_x=True,
-            log_y=True,
-        ),
-        Curves(
-            "Global error against cost",
-            tuple(
-                Trace(f"cost_{m}", f"global_{m}", name, "marked", i + 1)
-                for i, (m, name) in enumerate(METHODS.items())
-            ),
-            "evaluations of f in half a second",
-            "error",
-            log_x=True,
-            log_y=True,
-        ),
+        _errors("Global error after half a second", "ladder", "global", "order"),
+        _errors("Local error of one step", "ladder", "local", "local_order"),
+        _errors("Global error against cost", "cost", "global", ""),
         Curves(
             "Growth of a small swing in one step",
             (
-                *(
-                    Trace("grid", f"growth_{m}", name, "line", i + 1, f"limit_{m}")
-                    for i, (m, name) in enumerate(METHODS.items())
-                ),
-                *(
-                    Trace(f"limit_{m}", f"one_{m}", "", "points", i + 1)
-                    for i, m in enumerate(METHODS)
-                ),
+                *_traces("grid", "growth", "line", "limit"),
+                *(replace(t, label="") for t in _traces("limit", "one", "points")),
                 Trace("now", "all", "h now", "dash"),
             ),
             "step h [s]",
@@ -264,11 +243,7 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
         Curves(
             "Region of absolute stability",
             (
-                *(
-                    Trace(f"edge_re_{m}", f"edge_im_{m}", METHODS[m], "line", NAMES.index(m) + 1)
-                    for m in NAMES
-                    if m != "semi"
-                ),
+                *(t for t in _traces("edge_re", "edge_im", "line") if t.label != METHODS["semi"]),
                 Trace("z_re", "z_im", "hλ", "points"),
             ),
             "Re z",
@@ -280,7 +255,7 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
             "Energy",
             "J",
             (
-                *(Line(f"energy_{m}", rf"\text{{{name}}}") for m, name in METHODS.items()),
+                *_lines("energy"),
                 Line("energy", r"\text{exact}", "limit"),
             ),
         ),
@@ -319,7 +294,7 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
             return state
         t, n = (state.steps + 1) * self.period, params.rods
         x, stopped, clock, newton = state.x.copy(), state.stopped.copy(), state.clock, state.newton
-        steppers = [_stepper(*_key(m, params)) for m in NAMES]
+        steppers = [stepper_of(*_key(m, params)) for m in NAMES]
         with np.errstate(all="ignore"):
             while clock + params.h <= t + 1e-9:
                 for i, advance in enumerate(steppers):
@@ -348,7 +323,7 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
     def solve(self, params: IntegrationParams, state: IntegrationState) -> Iterator[Snapshot]:
         """One method an iteration: its errors for every step of LADDER, and its limit."""
         for i, name in enumerate(NAMES):
-            errors, local, costs, limit = _studied(*_key(name, params), params.start)
+            errors, local, costs, limit = errors_and_limit(*_key(name, params), params.start)
             found = {"method": i, "global": errors, "local": local, "cost": costs, "limit": limit}
             done = "All methods studied." if i == len(NAMES) - 1 else ""
             yield Snapshot(i + 1, found, done)
@@ -366,7 +341,7 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
         )
 
     def measure(self, params: IntegrationParams, state: IntegrationState) -> Measurement:
-        plant, own = params.plant, _tableau(params.tableau)
+        plant, own = params.plant, tableau_of(params.tableau)
         fall = plant.energy(np.eye(2 * params.rods)[0] * np.pi)
         begun = plant.energy(params.x0())
         measured: dict[str, float | np.ndarray] = {
@@ -396,7 +371,7 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
             "all": np.array([0.0, HIGHEST]),
             "z_re": z.real,
             "z_im": z.imag,
-            "conditions": order_conditions(_tableau(params.tableau)),
+            "conditions": order_conditions(tableau_of(params.tableau)),
         }
         for i, name in enumerate(NAMES):
             errors, local = state.global_errors[i], state.local_errors[i]
@@ -408,12 +383,12 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
                 f"cost_{name}": state.costs[i],
                 f"order_{name}": _number(slope(LADDER, errors)),
                 f"local_order_{name}": _number(slope(LADDER, local)),
-                f"growth_{name}": _growth(*_key(name, params)),
+                f"growth_{name}": growth_of(*_key(name, params)),
                 f"limit_{name}": limit,
                 f"one_{name}": np.ones(len(limit)),
             }
             if name != "semi":
-                edge = _edge(_key(name, params)[0])
+                edge = edge_of(_key(name, params)[0])
                 found |= {f"edge_re_{name}": edge.real, f"edge_im_{name}": edge.imag}
         return found
 
@@ -432,7 +407,7 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
         for i, (name, title) in enumerate(METHODS.items()):
             q, lost, hinge = state.x[i, :rods], bool(state.stopped[i]), hinges[i + 1]
             scene.arm(f"pendulum {name}", hanging(rods, _xy(hinge), COLORS[i]), q)
-            above = [0.0, 0.0, (0.16, 0.1)[i % 2]]
+            above = [0.0, 0.0, (0.22, 0.1)[i % 2]]
             scene.label(f"name {name}", f"{title} ✗" if lost else title, hinge + above)
             if lost:
                 scene.sphere(f"lost {name}", hinge + _tip(q), 0.06, "warning")
@@ -442,92 +417,6 @@ def _key(name: str, params: IntegrationParams) -> tuple[str, int, float]:
     """What fixes a method and its system."""
     text = {"yours": params.tableau, "implicit": params.implicit}.get(name, name)
     return text, params.rods, params.friction
-
-
-@lru_cache(maxsize=64)
-def _tableau(text: str) -> Tableau:
-    return TABLEAUS[text] if text in TABLEAUS else parse(text)
-
-
-@lru_cache(maxsize=64)
-def _stepper(text: str, rods: int, friction: float) -> Stepper:
-    """One step of a method."""
-    plant = pendulum(rods, friction)
-    if text != "semi":
-        tableau, flow = _tableau(text), plant.flow
-        return lambda x, t, h: step(tableau, flow, x, t, h)
-
-    def semi_implicit(x: np.ndarray, t: float, h: float) -> Step:
-        q, v = semi_implicit_euler(plant.acceleration, x[:rods], x[rods:], h)
-        return Step(np.concatenate([q, v]), 1, 0, 0.0, "")
-
-    return semi_implicit
-
-
-@lru_cache(maxsize=4)
-def _reference(rods: int, friction: float, start: float) -> tuple[np.ndarray, ...]:
-    """x(DURATION), x(LOCAL_FROM) and (k, 2 nq) x(LOCAL_FROM + h) for h of LADDER."""
-    flow = pendulum(rods, friction).flow
-    x = np.zeros(2 * rods)
-    x[0] = start
-    middle = exact(flow, x, 0.0, LOCAL_FROM)
-    ends = np.array([exact(flow, middle, LOCAL_FROM, LOCAL_FROM + h) for h in LADDER])
-    return exact(flow, middle, LOCAL_FROM, DURATION), middle, ends
-
-
-@lru_cache(maxsize=64)
-def _studied(
-    text: str, rods: int, friction: float, start: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Global errors (k,), local errors (k,), costs (k,) and the largest step [s] of a method."""
-    advance = _stepper(text, rods, friction)
-    end, middle, ends = _reference(rods, friction, start)
-    x = np.zeros(2 * rods)
-    x[0] = start
-    with np.errstate(all="ignore"):
-        errors, costs = global_errors(advance, x, end, DURATION, COUNTS)
-        local = local_errors(advance, middle, LOCAL_FROM, ends, LADDER)
-        limit = _limit(text, rods, friction)
-    return errors, local, costs, limit
-
-
-@lru_cache(maxsize=64)
-def _limit(text: str, rods: int, friction: float) -> float:
-    """The step [s] beyond which a small swing grows, found on the method itself by raising it;
-    LONGEST where none does."""
-    advance = _stepper(text, rods, friction)
-
-    def growth(h: float) -> float:
-        return spectral_radius(lambda x: advance(x, 0.0, h).x, 2 * rods, SMALL)
-
-    return min(measured_limit(growth, float(GRID[0]), LONGEST), LONGEST)
-
-
-@lru_cache(maxsize=64)
-def _growth(text: str, rods: int, friction: float) -> np.ndarray:
-    """(160,) what one step of GRID multiplies a small swing by, no more than HIGHEST: max |R(h
-    lambda)|, or for semi-implicit Euler the spectral radius of its linear step."""
-    plant = pendulum(rods, friction)
-    if text == "semi":
-        linear = plant.jacobian(np.zeros(2 * rods), 0.0)
-        eye, none = np.eye(rods), np.zeros((rods, rods))
-        steps = []
-        for h in GRID:
-            kick = np.block(
-                [[eye, none], [h * linear[rods:, :rods], eye + h * linear[rods:, rods:]]]
-            )
-            drift = np.block([[eye, h * eye], [none, eye]])
-            steps.append(np.abs(np.linalg.eigvals(drift @ kick)).max())
-        found = np.array(steps)
-    else:
-        found = StabilityFunction.of(_tableau(text)).growth(GRID, plant.eigenvalues)
-    capped: np.ndarray = np.minimum(np.nan_to_num(found, nan=HIGHEST), HIGHEST)
-    return capped
-
-
-@lru_cache(maxsize=64)
-def _edge(text: str) -> np.ndarray:
-    return boundary(StabilityFunction.of(_tableau(text)))
 
 
 def _number(value: float) -> np.ndarray:

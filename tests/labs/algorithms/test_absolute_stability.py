@@ -18,6 +18,11 @@ from labs.algorithms.runge_kutta import TABLEAUS, Flow, parse, step
 R = {name: StabilityFunction.of(tableau) for name, tableau in TABLEAUS.items()}
 
 
+def linear(m: np.ndarray) -> Flow:
+    """x' = M x."""
+    return Flow(lambda x, t: m @ x, lambda x, t: m)
+
+
 @pytest.mark.parametrize(
     ("name", "p"), [("euler", 1), ("midpoint", 2), ("heun", 2), ("rk3", 3), ("rk4", 4)]
 )
@@ -44,8 +49,7 @@ def test_a_step_multiplies_by_r(name: str) -> None:
     """On x' = lambda x, complex lambda as a rotation with damping in the plane."""
     for lam in (-1.0 + 2.0j, 0.3 - 0.7j, 4.0j):
         m = np.array([[lam.real, -lam.imag], [lam.imag, lam.real]])
-        flow = Flow(lambda x, t, m=m: m @ x, lambda x, t, m=m: m)
-        x = step(TABLEAUS[name], flow, np.array([1.0, 0.0]), 0.0, 0.3).x
+        x = step(TABLEAUS[name], linear(m), np.array([1.0, 0.0]), 0.0, 0.3).x
         wanted = R[name](np.array(0.3 * lam))
         np.testing.assert_allclose(x, [wanted.real, wanted.imag], atol=1e-13)
 
@@ -60,7 +64,7 @@ def test_the_reversed_characteristic_polynomial_is_the_determinant() -> None:
 
 @pytest.mark.parametrize("name", ["euler", "midpoint", "rk3", "rk4", "implicit-euler"])
 def test_the_boundary_is_where_r_has_modulus_one_and_closes(name: str) -> None:
-    edge = boundary(R[name])
+    edge = boundary(R[name], reach=8.0)
     np.testing.assert_allclose(np.abs(R[name](edge)), 1.0, atol=1e-12)
     assert abs(edge[0] - edge[-1]) < 1e-9
     assert np.abs(np.diff(edge)).max() < 0.15, "no jumps"
@@ -82,9 +86,9 @@ def test_the_boundary_of_gauss_legendre_is_the_imaginary_axis() -> None:
 
 
 def test_odd_tableaus_have_a_boundary_or_none() -> None:
-    assert len(boundary(StabilityFunction.of(parse("0 | ; | 0")))) == 0
+    assert len(boundary(StabilityFunction.of(parse("0 | ; | 0")), 4.0)) == 0
     for text in ("0 | ; 1 | 1; | 1/2 -1/2", "0 | ; 0 | 0; 0 | 0; | 1 1 1", "1 | 1; | 100"):
-        edge = boundary(StabilityFunction.of(parse(text)))
+        edge = boundary(StabilityFunction.of(parse(text)), 4.0)
         assert np.isfinite(edge).all()
 
 
@@ -118,7 +122,7 @@ def test_the_limit_of_euler_on_a_damped_oscillation() -> None:
 @pytest.mark.parametrize("name", ["euler", "midpoint", "rk3", "rk4"])
 def test_theory_and_the_limit_found_by_raising_h_agree(name: str) -> None:
     m = np.array([[0.0, 1.0], [-25.0, -2.0]])
-    flow = Flow(lambda x, t: m @ x, lambda x, t: m)
+    flow = linear(m)
 
     def growth(h: float) -> float:
         return spectral_radius(lambda x: step(TABLEAUS[name], flow, x, 0.0, h).x, 2, 1e-3)

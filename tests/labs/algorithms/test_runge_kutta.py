@@ -128,7 +128,8 @@ def test_the_integrators_of_mechanisms_do_the_same(name: str, tableau: Tableau) 
     q, v = rng.normal(size=(2, 3))
 
     def a(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        return np.sin(q[::-1]) - 0.2 * v * q
+        value: np.ndarray = np.sin(q[::-1]) - 0.2 * v * q
+        return value
 
     flow = Flow(lambda x, t: np.concatenate([x[3:], a(x[:3], x[3:])]), lambda x, t: np.eye(6))
     wanted = np.concatenate(INTEGRATORS[name].step(a, q, v, 0.1))

@@ -1,6 +1,7 @@
 """The lab integration: what its article claims, in numbers, and what its plots show."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
@@ -10,10 +11,7 @@ from labs.algorithms.absolute_stability import StabilityFunction, largest_step
 from labs.algorithms.convergence import exact
 from labs.algorithms.runge_kutta import TABLEAUS, order, parse
 from labs.appendix.integration import (
-    COUNTS,
     IMPLICIT,
-    LADDER,
-    LONGEST,
     METHODS,
     NAMES,
     Integration,
@@ -23,6 +21,7 @@ from labs.appendix.integration import (
 from labs.catalog import find
 from labs.errors import ParameterError
 from labs.lab import Inputs
+from labs.models.pendulum_study import COUNTS, LADDER, LONGEST
 from labs.models.pendulums import pendulum
 from labs.params import Value
 from labs.plots import measured, pictured
@@ -31,7 +30,6 @@ from labs.scene import NullScene
 from tests.labs.experiments import Experiments
 
 LAB = Integration()
-ENTRY = find("integration")
 EXPERIMENTS = Experiments("labs.appendix", "integration")
 ORDERS = {
     "euler": 1,
@@ -46,25 +44,33 @@ ORDERS = {
 UPRIGHT = np.pi
 
 
-def moved(seconds: float, setting: Mapping[str, Value]) -> tuple[World, list[IntegrationState]]:
-    """A world, and its states from t = 0 on."""
-    world = World(ENTRY, setting)
-    states = [world.state]
+@dataclass
+class Run:
+    """What one world came to."""
+
+    params: IntegrationParams
+    state: IntegrationState
+
+
+def moved(seconds: float, setting: Mapping[str, Value]) -> tuple[Run, list[IntegrationState]]:
+    """A run, and its states from t = 0 on."""
+    params = IntegrationParams().change(setting)
+    states = [LAB.init(params, np.random.default_rng(0))]
     for _ in range(round(seconds / LAB.period)):
-        world.state = LAB.step(world.params, Inputs(), world.state)
-        states.append(world.state)
-    return world, states
+        states.append(LAB.step(params, Inputs(), states[-1]))
+    return Run(params, states[-1]), states
 
 
-def solved(setting: Mapping[str, Value]) -> World:
-    """A world at t = 0 whose study of errors is done."""
-    world = World(ENTRY, setting)
-    while world.solving:
-        world.iterate()
-    return world
+def solved(setting: Mapping[str, Value]) -> Run:
+    """A run at t = 0 whose study of errors is done."""
+    params = IntegrationParams().change(setting)
+    state = LAB.init(params, np.random.default_rng(0))
+    for snapshot in LAB.solve(params, state):
+        state = LAB.accept(params, state, snapshot)
+    return Run(params, state)
 
 
-def energies(world: World, states: list[IntegrationState], method: str) -> np.ndarray:
+def energies(world: Run, states: list[IntegrationState], method: str) -> np.ndarray:
     plant = world.params.plant
     return np.array([plant.energy(s.x[NAMES.index(method)]) for s in states])
 
@@ -80,7 +86,7 @@ def over(states: list[IntegrationState], method: str) -> float:
     return float(np.argmax(passed)) * LAB.period if passed.any() else np.inf
 
 
-def number(world: World, name: str) -> float:
+def number(world: Run, name: str) -> float:
     return float(LAB.fields(world.params, world.state)[name][0])
 
 
@@ -270,7 +276,9 @@ def test_local_errors_are_those_of_one_step() -> None:
 
 
 def test_the_study_starts_again_when_the_tableau_changes() -> None:
-    world = solved({})
+    world = World(find("integration"))
+    while world.solving:
+        world.iterate()
     before = world.state.global_errors.copy()
     world.change({"tableau": "0 | ; | 1"})
     assert world.solving

@@ -10,6 +10,7 @@ from typing import Any
 
 from websockets.exceptions import ConnectionClosed
 
+from labs.catalog import find
 from tests.served import Opened, Served
 from tests.viser_client import SceneClient
 
@@ -82,8 +83,8 @@ def slider_to_scene() -> None:
         server.session("kinematics") as session,
         SceneClient(session) as scene,
     ):
-        scene.read_until(lambda _: any(label.startswith("Joint 1") for label in scene.controls))
-        label = next(label for label in scene.controls if label.startswith("Joint 1"))
+        label = f"{find('kinematics').lab.Params.tunables['q1'].label} [rad]"
+        scene.control(label)
         times = []
         for k in range(TRIES):
             time.sleep(0.05 + 0.001 * (k % 37))  # not in step with the frames

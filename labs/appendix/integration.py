@@ -52,7 +52,7 @@ IMPLICIT = {
 }
 REFERENCE = gauss_legendre(3)
 """Order 6, with steps of 10 ms: what the others are compared with in the scene."""
-SPACING = (-0.05, 0.36, 0.0)
+SPACING = (-0.04, 0.36, 0.0)
 """[m] from the hinge of one pendulum to the next: behind and beside it."""
 FASTEST = 40.0
 """[rad/s] a pendulum faster than this has blown up; one that falls from upright makes 11."""
@@ -396,7 +396,7 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
         """The pendulums in echelon, the exact one in front, and a line through all the places
         where its tip would be."""
         rods, top = params.rods, 0.25 + LENGTH * params.rods
-        scene.camera((1.3 + 0.65 * rods, 0.0, 0.4 + 0.5 * rods), (0.0, 0.0, 0.15 + 0.35 * rods))
+        scene.camera((1.75 + 0.6 * rods, 0.0, 0.35 + 0.5 * rods), (0.0, -0.04, 0.15 + 0.35 * rods))
         many = len(NAMES) + 1
         hinges = np.outer(np.arange(many) - (many - 1) / 2, SPACING)
         hinges[:, 2] = top

@@ -50,7 +50,7 @@ def test_a_lab_page_reads_without_scripts(client: TestClient, slug: str) -> None
     assert render(entry).html in html
     for name, tunable in entry.lab.Params.tunables.items():
         assert f'id="param-{name}"' in html, name
-        assert tunable.kind in {"knob", "choice", "toggle"}
+        assert tunable.kind in {"knob", "choice", "toggle", "text"}
 
 
 @pytest.mark.parametrize("slug", SLUGS)

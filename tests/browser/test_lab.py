@@ -190,12 +190,40 @@ def test_divergence_is_explained_and_reset_recovers(page: Page) -> None:
 
 def test_every_kind_of_plot_draws(page: Page) -> None:
     LabPage(page).open("oscillator")
-    for title in ("Position", "Phase", "Field", "Matrix", "Bars"):
+    for title in ("Position", "Phase", "Waves", "Field", "Matrix", "Bars"):
         expect(page.get_by_role("region", name=title)).to_be_visible()
     page.get_by_role("region", name="Field").scroll_into_view_if_needed()
     expect(page.locator("#plots .js-plotly-plot")).to_be_visible(timeout=20_000)
     expect(page.locator("#plots table")).to_contain_text(re.compile(r"-?\d\.\d"))
     screenshot(page, "plots")
+
+
+def test_curves_are_named_and_can_be_hidden(page: Page) -> None:
+    LabPage(page).open("oscillator")
+    chart = page.get_by_role("region", name="Waves")
+    entry = chart.get_by_role("button", name="square")
+    expect(chart.locator("polyline")).to_have_count(2)
+    entry.click()
+    expect(entry).to_have_attribute("aria-pressed", "false")
+    expect(chart.locator("polyline")).to_have_count(1)
+
+
+def test_a_text_is_edited_and_a_wrong_one_stays_to_be_put_right(page: Page) -> None:
+    lab = LabPage(page).open("integration")
+    field = lab.value("tableau")
+    field.fill("0 |\n1/2 | 1/3\n| 0 1")
+    field.blur()
+    wrong = page.locator("#param-tableau .wrong")
+    expect(wrong).to_contain_text("row 2: c = 0.5 but its a add up to 0.333333")
+    expect(field).to_have_value("0 |\n1/2 | 1/3\n| 0 1")
+    field.fill("0 |\n1/2 | 1/2\n| 0 1")
+    field.blur()
+    expect(wrong).to_be_hidden()
+    expect(page).to_have_url(re.compile("tableau="))
+    assert lab.status()["params"]["tableau"] == "0 |\n1/2 | 1/2\n| 0 1"
+    page.reload()
+    lab.wait_live()
+    expect(field).to_have_value("0 |\n1/2 | 1/2\n| 0 1")
 
 
 def test_a_shaded_matrix_shows_size_and_sign(page: Page) -> None:

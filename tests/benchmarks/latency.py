@@ -99,7 +99,9 @@ def slider_to_scene() -> None:
 
 
 def _turns_first_joint(found: dict[str, Any]) -> bool:
-    return found["type"] == "SetOrientationMessage" and str(found["name"]).count("/") == 2
+    return found["type"] == "SetOrientationMessage" and str(found["name"]).endswith(
+        "shoulder_pan_joint"
+    )
 
 
 def page_to_motion() -> None:

@@ -1,5 +1,6 @@
 """A bare client of Viser's protocol: what a browser's scene says and hears, without a browser."""
 
+import contextlib
 import struct
 import time
 from collections import deque
@@ -86,6 +87,18 @@ class SceneClient:
                 return found
             assert time.monotonic() < end, "no such scene message came"
         raise AssertionError
+
+    def skip(self, seconds: float) -> None:
+        """Reads on for a while, so that what comes next is new."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            with contextlib.suppress(TimeoutError):
+                window = self.socket.recv(left)
+                assert isinstance(window, bytes)
+                self._unread.extend(decode(window))
+        for found in self._unread:
+            self._note(found)
+        self._unread.clear()
 
     def set(self, label: str, value: Any) -> None:
         """Moves a control as a hand would."""

@@ -87,7 +87,7 @@ def slider_to_scene() -> None:
         scene.control(label)
         times = []
         for k in range(TRIES):
-            time.sleep(0.05 + 0.001 * (k % 37))  # not in step with the frames
+            scene.skip(0.05 + 0.001 * (k % 37))  # not in step with the frames
             begin = time.perf_counter()
             scene.set(label, 0.5 if k % 2 else -0.5)
             scene.read_until(_turns_first_joint)

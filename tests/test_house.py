@@ -165,7 +165,7 @@ def test_public_names_are_documented(path: Path) -> None:
         ("labs/reactive_control", 640),
         ("labs/optimal_control", 350),
         ("labs/reinforcement_learning", 350),
-        ("labs/appendix", 560),
+        ("labs/appendix", 450),
         ("server", 400),
     ],
 )

@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import logging
 import secrets
 from collections import deque
 from collections.abc import AsyncIterator
@@ -17,8 +16,7 @@ from server.messages import NewSession, Notice, SessionInfo
 from server.pipe import HELLO, STATUS
 from server.settings import Settings
 from server.supervisor import Supervisor, Worker, WorkerGone
-
-log = logging.getLogger("orclab.sessions")
+from server.tasks import Tasks
 
 QUEUE = 64
 """Messages a slow viewer may be behind: two seconds. Then it starts afresh."""
@@ -197,17 +195,16 @@ class Sessions:
     def __init__(self, settings: Settings, supervisor: Supervisor) -> None:
         self._settings, self._supervisor = settings, supervisor
         self._sessions: dict[str, Session] = {}
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._tasks = Tasks()
 
     def __len__(self) -> int:
         return len(self._sessions)
 
     def start(self) -> None:
-        self._do(self._reap())
+        self._tasks.do(self._reap())
 
     async def stop(self) -> None:
-        for task in self._tasks:
-            task.cancel()
+        self._tasks.cancel()
         for session in tuple(self._sessions.values()):
             self._forget(session, "ended", "The server stops.")
 
@@ -245,7 +242,7 @@ class Sessions:
     def _watch(self, session: Session) -> None:
         worker = session.worker
         assert worker is not None
-        worker.on_gone = lambda reason: self._do(self._recover(session, reason))
+        worker.on_gone = lambda reason: self._tasks.do(self._recover(session, reason))
         if worker.gone:
             worker.on_gone(worker.gone)
 
@@ -285,7 +282,7 @@ class Sessions:
         worker, session.worker = session.worker, None
         if worker:
             worker.on_gone = lambda reason: None
-            self._do(self._supervisor.release(worker, "its session ended"))
+            self._tasks.do(self._supervisor.release(worker, "its session ended"))
 
     async def _reap(self) -> None:
         settings = self._settings
@@ -303,13 +300,3 @@ class Sessions:
                         f"Nobody touched this lab for {minutes:.0f} minutes, so it made room for "
                         "others. Reload the page to go on with the same parameters.",
                     )
-
-    def _do(self, work: Any) -> None:
-        task = asyncio.ensure_future(work)
-        self._tasks.add(task)
-        task.add_done_callback(self._done)
-
-    def _done(self, task: "asyncio.Task[None]") -> None:
-        self._tasks.discard(task)
-        if not task.cancelled() and (error := task.exception()):
-            log.error("a session's task failed", exc_info=error)

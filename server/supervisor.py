@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import logging
 import multiprocessing
 import os
 import signal
@@ -16,8 +15,7 @@ from labs.errors import LabError
 from server import worker_entry
 from server.pipe import CONTROL, HEADER, encode, frame
 from server.settings import Settings
-
-log = logging.getLogger("orclab.supervisor")
+from server.tasks import Tasks
 
 REQUEST_SECONDS = 10.0
 SPAWN_SECONDS = 60.0
@@ -152,7 +150,7 @@ class Supervisor:
         self._context.set_forkserver_preload(["server.preload"])
         self._spares: list[Worker] = []
         self._workers: set[Worker] = set()
-        self._tasks: set[asyncio.Task[Any]] = set()
+        self._tasks = Tasks()
         self._filling = asyncio.Lock()
 
     @property
@@ -167,13 +165,12 @@ class Supervisor:
 
     def start(self) -> None:
         """Begins to watch, and warms the first spare."""
-        self._do(self._watch())
-        self._do(self._fill())
+        self._tasks.do(self._watch())
+        self._tasks.do(self._fill())
 
     async def stop(self) -> None:
         """Ends every worker."""
-        for task in self._tasks:
-            task.cancel()
+        self._tasks.cancel()
         await asyncio.gather(*(w.end("the server stops") for w in tuple(self._workers)))
 
     async def take(self) -> Worker:
@@ -182,7 +179,7 @@ class Supervisor:
         if spare:
             self._spares.remove(spare)
         worker = spare or await self._spawn()
-        self._do(self._fill())
+        self._tasks.do(self._fill())
         return worker
 
     async def release(self, worker: Worker, reason: str) -> None:
@@ -224,21 +221,11 @@ class Supervisor:
                 if worker.gone:
                     self._workers.discard(worker)
                     if worker in self._spares:
-                        self._do(self._fill())
+                        self._tasks.do(self._fill())
                 elif worker.port and worker.silence > self._settings.hang_seconds:
                     seconds = self._settings.hang_seconds
                     reason = f"it stopped answering for {seconds:g} s and was ended"
-                    self._do(self.release(worker, reason))
-
-    def _do(self, work: Any) -> None:
-        task = asyncio.ensure_future(work)
-        self._tasks.add(task)
-        task.add_done_callback(self._done)
-
-    def _done(self, task: asyncio.Task[Any]) -> None:
-        self._tasks.discard(task)
-        if not task.cancelled() and (error := task.exception()):
-            log.error("a supervisor's task failed", exc_info=error)
+                    self._tasks.do(self.release(worker, reason))
 
 
 def _obituary(exitcode: int | None) -> str:

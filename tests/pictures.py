@@ -4,7 +4,6 @@ its article); with `--page`, docs/LAB.webp of its page."""
 
 import argparse
 import io
-import shutil
 from pathlib import Path
 from urllib.parse import urlencode
 
@@ -12,9 +11,9 @@ from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
 from labs.catalog import find
+from tests import chromium
 from tests.served import Served
 
-ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=gl-egl", "--ignore-gpu-blocklist"]
 CARD, PANEL = (640, 400), 262
 """[px] size of a card's picture; width of the panel beside the scene."""
 
@@ -27,9 +26,10 @@ def main() -> None:
     parser.add_argument("--page", action="store_true", help="the whole page, for the README")
     options = parser.parse_args()
     query = dict(text.split("=", 1) for text in options.params)
-    path = shutil.which("chromium") or shutil.which("chromium-browser")
     with Served() as server, sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
+        browser = playwright.chromium.launch(
+            executable_path=chromium.find(), args=chromium.ARGUMENTS
+        )
         page = browser.new_page(viewport={"width": 1440, "height": 900})
         page.add_init_script("localStorage.setItem('graphics', 'high')")
         page.goto(f"{server.address}/labs/{options.lab}?{urlencode(query)}")

@@ -1,7 +1,6 @@
 """Chromium, driven by Playwright. Skipped only where no browser is installed, and never in CI."""
 
 import os
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -9,12 +8,11 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
+from tests import chromium as chromium_browser
 from tests.served import Served
 
 SCREENSHOTS = Path("screenshots")
 Visit = Callable[..., BrowserContext]
-# Mesa's software rendering through EGL: two to three times faster than the browser's own.
-ARGUMENTS = ["--no-sandbox", "--use-gl=angle", "--use-angle=gl-egl", "--ignore-gpu-blocklist"]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -25,13 +23,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session")
 def chromium() -> Iterator[Browser]:
-    path = shutil.which("chromium") or shutil.which("chromium-browser")
+    path = chromium_browser.find()
     if path is None:
         if os.environ.get("CI"):
             pytest.fail("CI must have a browser: install Debian's chromium")
         pytest.skip("no chromium is installed")
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=ARGUMENTS)
+        browser = playwright.chromium.launch(executable_path=path, args=chromium_browser.ARGUMENTS)
         yield browser
         browser.close()
 

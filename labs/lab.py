@@ -51,6 +51,9 @@ class State:
     t: float = 0.0
     """Simulated time [s]."""
     trouble: str = ""
+    seconds: Mapping[str, float | np.ndarray] = field(default_factory=dict)
+    """Wall-clock durations [s] a solver measured, by name, for `fields` to show. Nothing is
+    computed with them: they are the one part of a state that two equal runs do not share."""
 
 
 @dataclass(frozen=True)
@@ -58,9 +61,13 @@ class Snapshot:
     """One iteration of a solver: what `Lab.accept` takes into the state."""
 
     iteration: int
+    """From 1."""
     data: Mapping[str, Any] = field(default_factory=dict)
+    """Plain data that is never written into again: it may be accepted once more, to look back."""
     done: str = ""
     """Why the solver stopped, in a sentence; empty while it goes on."""
+    progress: float | None = None
+    """The part done, in [0, 1], where it is known."""
 
 
 P = TypeVar("P", bound=Params)
@@ -101,6 +108,13 @@ class Lab(abc.ABC, Generic[P, S]):
         """The state that has taken in what the solver found."""
         raise NotImplementedError
 
+    def edit(
+        self, params: P, handle: str, point: tuple[float, float, float]
+    ) -> Mapping[str, Value]:
+        """The parameters that change when the handle of this name is dragged to `point` [m], such
+        as a target's coordinates. Where there are any, `step` does not see the handle."""
+        return {}
+
     def measure(self, params: P, state: S) -> Measurement:
         """Channels over time: scalars and (n,) vectors, finite, the same shapes all through a
         run. A scalar that is not defined (yet) is left out."""
@@ -113,6 +127,11 @@ class Lab(abc.ABC, Generic[P, S]):
     @abc.abstractmethod
     def draw(self, scene: Scene, params: P, state: S) -> None:
         """Draws one frame."""
+
+    @classmethod
+    def prepare(cls) -> None:
+        """Compiles and loads what the first step would wait for. Called once, before any session,
+        in the process that sessions are forked from; nothing may depend on it."""
 
     @classmethod
     def check_action(cls, name: str) -> None:

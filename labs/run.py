@@ -107,11 +107,15 @@ class World:
         self._note(Event(self.steps, "press", action))
 
     def hold(self, handle: str, point: Point | None) -> None:
-        """A handle is held at a point [m], or released (None)."""
+        """A handle is held at a point [m], or released (None). Raises ParameterError."""
         if point is None:
-            self._handles.pop(handle, None)
+            if self._handles.pop(handle, None) is None:
+                return
         elif not np.all(np.isfinite(point)) or len(point) != 3:
             raise ParameterError(f"{handle} was dragged to {point}: three finite numbers [m] go")
+        elif edits := self.lab.edit(self.params, handle, point):
+            self.change(edits)
+            return
         else:
             self._handles[handle] = point
         self._note(Event(self.steps, "hold", handle, point))

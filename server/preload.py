@@ -1,4 +1,4 @@
-"""What every worker needs, imported and loaded once in the process they are forked from."""
+"""What every worker needs: imported, loaded and compiled once, where they are forked from."""
 
 import gc
 
@@ -7,7 +7,8 @@ from labs.catalog import catalog
 from labs.models.arms import ARMS, load
 from server import meshes
 
-catalog()
+for _entry in catalog().values():
+    _entry.lab.prepare()
 for _name in ARMS:
     _arm = load(_name)
     for _piece in _arm.visuals:

@@ -4,6 +4,7 @@ A drawing is said anew each frame; what a frame does not name disappears from vi
 scene sends only what changed. `NullScene` is its twin for headless runs.
 """
 
+import math
 from typing import Literal, Protocol
 
 import numpy as np
@@ -80,6 +81,35 @@ class Scene(Protocol):
         """A short text at a (3,) point [m]."""
         ...
 
+    def cells(
+        self,
+        name: str,
+        origin: ArrayLike,
+        size: float,
+        colors: np.ndarray,
+        *,
+        clickable: bool = True,
+    ) -> None:
+        """A horizontal board of square cells with sides of `size` [m], thin gaps between them.
+        `colors` (rows, columns, 3) in [0, 1], sRGB. Row 0 lies farthest along y, column 0 first
+        along x; `origin` (3,) [m] is the corner of least x and y, so that cell (r, c) covers
+        origin + size [c, c + 1] in x and origin + size [rows - 1 - r, rows - r] in y
+        (`cell_at`, `cell_centers`). A click on a clickable board holds the handle of its name
+        at the point clicked, and releases it at once: `Lab.edit` says what that changes."""
+        ...
+
+    def surface(self, name: str, points: np.ndarray, colors: np.ndarray) -> None:
+        """A surface through `points` (rows, columns, 3) [m], at least two of each, coloured by
+        `colors` of the same shape in [0, 1], sRGB, blended in between; seen from both sides."""
+        ...
+
+    def arrows(
+        self, name: str, starts: np.ndarray, ends: np.ndarray, color: Color = "force"
+    ) -> None:
+        """Many arrows at once, from `starts` to `ends`, both (k, 3) [m], k from 0; one of no
+        length is left out. All have the same head, in proportion to the longest arrow."""
+        ...
+
 
 class NullScene:
     """A scene nobody sees; it keeps the names drawn, so that tests can ask."""
@@ -134,3 +164,40 @@ class NullScene:
 
     def label(self, name: str, text: str, position: ArrayLike) -> None:
         self.names.append(name)
+
+    def cells(
+        self,
+        name: str,
+        origin: ArrayLike,
+        size: float,
+        colors: np.ndarray,
+        *,
+        clickable: bool = True,
+    ) -> None:
+        self.names.append(name)
+
+    def surface(self, name: str, points: np.ndarray, colors: np.ndarray) -> None:
+        self.names.append(name)
+
+    def arrows(
+        self, name: str, starts: np.ndarray, ends: np.ndarray, color: Color = "force"
+    ) -> None:
+        self.names.append(name)
+
+
+def cell_at(
+    point: ArrayLike, origin: ArrayLike, size: float, rows: int, columns: int
+) -> tuple[int, int] | None:
+    """The (row, column) of the cell of `Scene.cells` over or under `point` (3,) [m]; None beside
+    the board."""
+    x, y, _ = (np.asarray(point, float) - np.asarray(origin, float)) / size
+    row, column = math.floor(rows - y), math.floor(x)
+    return (row, column) if 0 <= row < rows and 0 <= column < columns else None
+
+
+def cell_centers(origin: ArrayLike, size: float, rows: int, columns: int) -> np.ndarray:
+    """The middle (rows, columns, 3) [m] of every cell of `Scene.cells`."""
+    x, y, z = np.asarray(origin, float)
+    across = x + size * (np.arange(columns) + 0.5)
+    away = y + size * (rows - np.arange(rows) - 0.5)
+    return np.stack([*np.meshgrid(across, away), np.full((rows, columns), z)], axis=-1)

@@ -18,7 +18,7 @@ class Item:
 class Mailbox:
     """Slider callbacks, page buttons, drags and the API put; the loop takes, once a frame.
 
-    Neighbouring changes of parameters, and of one handle, merge: the latest wins."""
+    Neighbouring changes of parameters, and of a held handle, merge: the latest wins."""
 
     def __init__(self) -> None:
         self._items: deque[Item] = deque()
@@ -32,7 +32,7 @@ class Mailbox:
                 if do == "params":
                     last.arguments["changes"] |= arguments["changes"]
                     return
-                if do == "hold" and last.arguments["handle"] == arguments["handle"]:
+                if do == "hold" and _still_held(last.arguments, arguments):
                     last.arguments["point"] = arguments["point"]
                     return
             self._items.append(Item(do, ref, arguments))
@@ -46,3 +46,9 @@ class Mailbox:
             items = list(self._items)
             self._items.clear()
             return items
+
+
+def _still_held(before: dict[str, Any], after: dict[str, Any]) -> bool:
+    """Whether a handle is dragged on. Its release stays apart: a click is both in a moment."""
+    held = before["point"] is not None and after["point"] is not None
+    return held and bool(before["handle"] == after["handle"])

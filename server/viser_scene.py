@@ -4,6 +4,7 @@ An arm is a tree of nodes, one a joint, each placed in its parent: moving the ar
 quaternion a joint, and one that has not moved sends nothing. What a frame does not draw is
 hidden."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +17,7 @@ from labs.models.arms import Arm
 from labs.run import World
 from labs.scene import Color
 from server import meshes
+from server.boards import CellsNode, glb
 from server.mailbox import Mailbox
 from server.messages import View
 from server.nodes import COLORS, ArmNode, Node
@@ -222,6 +224,62 @@ class ViserScene:
         node = self._node(name, "label", make)
         node.send("text", text)
         node.place(np.asarray(position))
+
+    def cells(
+        self,
+        name: str,
+        origin: ArrayLike,
+        size: float,
+        colors: np.ndarray,
+        *,
+        clickable: bool = True,
+    ) -> None:
+        corner = _three(origin)
+
+        def clicked(point: tuple[float, float, float]) -> None:
+            self._mailbox.put("hold", handle=name, point=point)
+            self._mailbox.put("hold", handle=name, point=None)
+
+        def make() -> Node:
+            return CellsNode(
+                self._server, name, corner, size, colors, clicked if clickable else None
+            )
+
+        node = self._node(name, (corner, size, colors.shape, clickable), make)
+        assert isinstance(node, CellsNode)
+        node.paint(colors)
+
+    def surface(self, name: str, points: np.ndarray, colors: np.ndarray) -> None:
+        data = glb(points, colors)
+
+        def make() -> Node:
+            return Node(self._server.scene.add_glb(f"/{name}", data, cast_shadow=False))
+
+        self._node(name, "surface", make).send("glb_data", data)
+
+    def arrows(
+        self, name: str, starts: np.ndarray, ends: np.ndarray, color: Color = "force"
+    ) -> None:
+        lengths = np.linalg.norm(ends - starts, axis=1)
+        if not lengths.any():
+            return
+        points = np.stack([starts, ends], axis=1)[lengths > 0.0].astype(np.float32)
+        # A head by steps of its size: the longest arrow may change a little each frame.
+        head = 0.35 * 1.25 ** round(math.log(float(lengths.max()), 1.25))
+
+        def make() -> Node:
+            return Node(
+                self._server.scene.add_arrows(
+                    f"/{name}",
+                    points,
+                    COLORS[color],
+                    shaft_radius=0.15 * head,
+                    head_radius=0.4 * head,
+                    head_length=head,
+                )
+            )
+
+        self._node(name, (color, head), make).send("points", points)
 
     # Nodes ----------------------------------------------------------------------------------
 

@@ -159,7 +159,9 @@ class Live:
         self.world.press(action)
 
     def _do_hold(self, handle: str, point: tuple[float, float, float] | None) -> None:
+        runs = self.world.runs
         self.world.hold(handle, point)
+        self._changed(restarted=self.world.runs != runs)
 
     def _do_view(self, view: dict[str, Any]) -> None:
         self.view = View(**view)

@@ -150,6 +150,41 @@ class CheckingScene:
         _point(position)
         assert text.strip()
 
+    def cells(
+        self,
+        name: str,
+        origin: ArrayLike,
+        size: float,
+        colors: np.ndarray,
+        *,
+        clickable: bool = True,
+    ) -> None:
+        self._new(name)
+        _point(origin)
+        assert 0.0 < size < np.inf
+        assert colors.ndim == 3
+        assert min(colors.shape) >= 1, "a board has cells"
+        _colors(colors)
+
+    def surface(self, name: str, points: np.ndarray, colors: np.ndarray) -> None:
+        self._new(name)
+        assert points.ndim == 3
+        assert min(points.shape[:2]) >= 2, "a surface extends in two directions"
+        assert points.shape[2] == 3
+        assert points.shape == colors.shape
+        assert np.isfinite(points).all()
+        _colors(colors)
+
+    def arrows(
+        self, name: str, starts: np.ndarray, ends: np.ndarray, color: Color = "force"
+    ) -> None:
+        self._new(name, color)
+        assert starts.ndim == 2
+        assert starts.shape[1] == 3
+        assert starts.shape == ends.shape
+        assert np.isfinite(starts).all()
+        assert np.isfinite(ends).all()
+
     def _new(self, name: str, color: Color = "actual") -> None:
         assert name.strip()
         assert "/" not in name, "a name is one step in the scene's tree"
@@ -163,6 +198,11 @@ def _point(value: ArrayLike) -> np.ndarray:
     assert point.shape == (3,)
     assert np.isfinite(point).all()
     return point
+
+
+def _colors(colors: np.ndarray) -> None:
+    assert colors.shape[-1] == 3
+    assert ((colors >= 0.0) & (colors <= 1.0)).all(), "a colour lies in [0, 1]"
 
 
 def check(world: World) -> None:

@@ -23,6 +23,8 @@ Value = float | str | bool
 # A logarithmic slider that reaches zero bends to linear below high / LOG_SPAN.
 LOG_SPAN = 1000.0
 TEXT_LENGTH = 400
+LONGEST_TEXT = 4000
+"""A link holds it: three bytes for a letter in most alphabets, three characters for a byte."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +107,8 @@ class Text(Tunable):
     with a `field_validator` that raises ValueError, its message a sentence that helps."""
 
     rows: int
+    most: int
+    """Characters."""
 
 
 def knob(
@@ -157,11 +161,14 @@ def text(
     symbol: str = "",
     group: str = "",
     rows: int = 1,
+    most: int = TEXT_LENGTH,
     effect: Effect = "live",
 ) -> Any:
-    """A text of at most TEXT_LENGTH characters, shown in `rows` lines."""
-    tunable = Text(help, label, symbol, group, effect, rows)
-    return _field(default, tunable, max_length=TEXT_LENGTH)
+    """A text of at most `most` characters (up to LONGEST_TEXT), shown in `rows` lines."""
+    if not 1 <= most <= LONGEST_TEXT:
+        raise ValueError(f"most = {most}: a text holds from 1 to {LONGEST_TEXT} characters")
+    tunable = Text(help, label, symbol, group, effect, rows, most)
+    return _field(default, tunable, max_length=most)
 
 
 def _field(default: Value, tunable: Tunable, **constraints: Any) -> Any:

@@ -124,6 +124,10 @@ class Lab(abc.ABC, Generic[P, S]):
         """Arrays for curves, heat maps, matrices and bars; asked for a few times a second."""
         return {}
 
+    def notes(self, params: P, state: S) -> Mapping[str, str]:
+        """Sentences for `Note` plots, asked for with the fields. No name is a field's, too."""
+        return {}
+
     @abc.abstractmethod
     def draw(self, scene: Scene, params: P, state: S) -> None:
         """Draws one frame."""

@@ -98,13 +98,15 @@ class Matrix:
 
 @dataclass(frozen=True)
 class Bars:
-    """A 1-D field as bars, with the limit (a 1-D field) each must stay within."""
+    """A 1-D field as bars, with the limit (a 1-D field) each must stay within, and with marks (a
+    1-D field, which may be empty) across the bars where each ought to end."""
 
     title: str
     field: str
     symbol: str
     unit: str
     limit: str = ""
+    marks: str = ""
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,15 @@ class Readout:
     whole: bool = False
 
 
-Plot = TimeSeries | Curve | Curves | HeatMap | Matrix | Bars | Readout
+@dataclass(frozen=True)
+class Note:
+    """What `Lab.notes` says under this name: plain sentences, a paragraph a line."""
+
+    title: str
+    note: str
+
+
+Plot = TimeSeries | Curve | Curves | HeatMap | Matrix | Bars | Readout | Note
 
 
 def measured(plot: Plot) -> tuple[str, ...]:
@@ -129,7 +139,7 @@ def measured(plot: Plot) -> tuple[str, ...]:
 
 
 def pictured(plot: Plot) -> tuple[str, ...]:
-    """The channels of `Lab.fields` a plot shows."""
+    """The channels of `Lab.fields` and `Lab.notes` a plot shows."""
     match plot:
         case Curve(x=x, y=y):
             return (x, y)
@@ -140,8 +150,10 @@ def pictured(plot: Plot) -> tuple[str, ...]:
             return (x, y, z)
         case Matrix(field=field):
             return (field,)
-        case Bars(field=field, limit=limit):
-            return (field, limit) if limit else (field,)
+        case Bars(field=field, limit=limit, marks=marks):
+            return tuple(name for name in (field, limit, marks) if name)
+        case Note(note=note):
+            return (note,)
         case _:
             return ()
 

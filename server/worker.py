@@ -283,7 +283,8 @@ class Live:
         fields = None
         wanted = self.viewers and self._fields and not self.failure
         if wanted and self._beat("fields", now, FIELDS):
-            found = self.world.lab.fields(self.world.params, self.world.state)
+            lab, params, state = self.world.lab, self.world.params, self.world.state
+            found = {**lab.fields(params, state), **lab.notes(params, state)}
             fields = {name: found[name] for name in self._fields if name in found}
         if self.viewers and (len(rows) or fields):
             message = Telemetry.model_construct(type="telemetry", run=self.world.runs, rows=rows)

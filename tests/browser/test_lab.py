@@ -190,11 +190,14 @@ def test_divergence_is_explained_and_reset_recovers(page: Page) -> None:
 
 def test_every_kind_of_plot_draws(page: Page) -> None:
     LabPage(page).open("oscillator")
-    for title in ("Position", "Phase", "Waves", "Field", "Matrix", "Bars"):
+    for title in ("Position", "Phase", "Waves", "Field", "Matrix", "Bars", "Note"):
         expect(page.get_by_role("region", name=title)).to_be_visible()
     page.get_by_role("region", name="Field").scroll_into_view_if_needed()
     expect(page.locator("#plots .js-plotly-plot")).to_be_visible(timeout=20_000)
     expect(page.locator("#plots table")).to_contain_text(re.compile(r"-?\d\.\d"))
+    expect(page.get_by_role("region", name="Bars").locator(".mark")).to_have_count(2)
+    note = page.get_by_role("region", name="Note").locator("p")
+    expect(note).to_have_text([re.compile(r"on the (left|right)\.$"), "It swings."])
     screenshot(page, "plots")
 
 

@@ -16,7 +16,7 @@ from labs.catalog import Entry, catalog
 from labs.lab import Inputs, Snapshot, State
 from labs.models.arms import Arm
 from labs.params import Choice, Knob, Params, Text, Toggle, Value
-from labs.plots import Bars, Curve, Curves, HeatMap, Matrix, Readout, TimeSeries
+from labs.plots import Bars, Curve, Curves, HeatMap, Matrix, Note, Readout, TimeSeries
 from labs.run import Event, World, run
 from labs.scene import Color
 from server.articles import render, tex
@@ -214,6 +214,8 @@ def check(world: World) -> None:
         assert np.isfinite(value).all(), f"{name} is finite"
     for name, value in lab.fields(params, state).items():
         assert np.isfinite(value).all(), f"{name} is finite"
+    for name, text in lab.notes(params, state).items():
+        assert text.strip() == text != "", f"{name} says something"
     scene = CheckingScene()
     lab.draw(scene, params, state)
     if state.trouble:
@@ -366,8 +368,11 @@ def test_plots_name_real_channels(entry: Entry) -> None:
     world = moved(entry)
     measured = lab.measure(world.params, world.state)
     pictured = lab.fields(world.params, world.state)
+    noted = lab.notes(world.params, world.state)
+    assert not set(noted) & set(pictured)
     for plot in lab.plots:
-        assert set(plots.pictured(plot)) <= set(pictured), plot
+        known = noted if isinstance(plot, Note) else pictured
+        assert set(plots.pictured(plot)) <= set(known), plot
         match plot:
             case TimeSeries(unit=unit, lines=lines, select=select):
                 assert lines, plot
@@ -399,10 +404,12 @@ def test_plots_name_real_channels(entry: Entry) -> None:
             case Matrix(field=name, symbol=symbol):
                 assert np.ndim(pictured[name]) == 2
                 tex(symbol)
-            case Bars(field=name, symbol=symbol, limit=limit):
+            case Bars(field=name, symbol=symbol, limit=limit, marks=marks):
                 assert np.ndim(pictured[name]) == 1
                 if limit:
                     assert np.shape(pictured[limit]) == np.shape(pictured[name])
+                if marks:
+                    assert np.shape(pictured[marks]) in {np.shape(pictured[name]), (0,)}
                 tex(symbol)
             case Readout(channel=channel, label=label):
                 assert label

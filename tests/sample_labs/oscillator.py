@@ -8,7 +8,7 @@ import numpy as np
 
 from labs.lab import Action, Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Params, Value, choice, knob, toggle
-from labs.plots import Bars, Curve, Curves, HeatMap, Line, Matrix, Readout, TimeSeries, Trace
+from labs.plots import Bars, Curve, Curves, HeatMap, Line, Matrix, Note, Readout, TimeSeries, Trace
 from labs.scene import Scene
 
 
@@ -57,7 +57,8 @@ class Oscillator(Lab[OscillatorParams, OscillatorState]):
         ),
         HeatMap("Field", "angle", "angle", "field", "a [rad]", "b [rad]", "value"),
         Matrix("Matrix", "matrix", "M", shade=True),
-        Bars("Bars", "bars", "b", "m", "limits"),
+        Bars("Bars", "bars", "b", "m", "limits", "marks"),
+        Note("Note", "side"),
         Readout("root", "Root", ""),
         Readout("late", "Late", "s"),
     )
@@ -117,7 +118,12 @@ class Oscillator(Lab[OscillatorParams, OscillatorState]):
             "matrix": np.array([[state.x, 1.0], [1.0, -state.x]]),
             "bars": np.array([state.x, 0.5]),
             "limits": np.array([1.0, 1.0]),
+            "marks": np.array([0.0, 0.25]),
         }
+
+    def notes(self, params: OscillatorParams, state: OscillatorState) -> Mapping[str, str]:
+        side = "right" if state.x > 0.0 else "left"
+        return {"side": f"The point is on the {side}.\nIt swings."}
 
     def draw(self, scene: Scene, params: OscillatorParams, state: OscillatorState) -> None:
         scene.camera((2.0, -2.0, 1.5), (0.0, 0.0, 0.5))

@@ -96,6 +96,7 @@ def test_fields_come_with_the_telemetry(served: Served) -> None:
         fields = stream.next("telemetry", lambda m: m["fields"] is not None)["fields"]
         assert len(fields["field"]) == len(fields["angle"]) == 40
         assert len(fields["matrix"]) == 2
+        assert fields["side"].endswith("It swings.")
 
 
 def test_exports_hold_the_same_run(served: Served) -> None:

@@ -1,4 +1,4 @@
-// One bar a component, and the limit each must stay within.
+// One bar a component, the limit each must stay within, and marks to compare with.
 
 import { card } from "./card.js";
 import { around, Chart } from "./chart.js";
@@ -16,13 +16,14 @@ export class Bars {
     if (!fields[this.plot.field]) return;
     this.values = fields[this.plot.field].flat();
     this.limits = fields[this.plot.limit]?.flat() ?? [];
+    this.marks = fields[this.plot.marks]?.flat() ?? [];
     this.draw();
   }
 
   draw() {
     if (!this.values || !this.body.clientWidth) return;
     const n = this.values.length;
-    const wanted = around([...this.values, ...this.limits, ...this.limits.map((v) => -v)], { zero: true });
+    const wanted = around([...this.values, ...this.limits, ...this.limits.map((v) => -v), ...this.marks], { zero: true });
     const fits = this.y && this.y[0] <= wanted[0] && this.y[1] >= wanted[1];
     if (!fits || this.y[1] - this.y[0] > 3 * (wanted[1] - wanted[0])) this.y = wanted;
     const chart = this.chart;
@@ -33,6 +34,9 @@ export class Bars {
       const left = chart.x(i + 0.7);
       const full = Math.abs(value) >= 0.999 * this.limits[i];
       chart.add("rect", { x: left, y: a, width: chart.x(i + 1.3) - left, height: Math.max(1, b - a), class: full ? "column full" : "column" });
+    });
+    this.marks.forEach((mark, i) => {
+      if (Number.isFinite(mark)) chart.line([i + 0.6, mark], [i + 1.4, mark], "mark");
     });
     this.limits.forEach((limit, i) => {
       for (const edge of [limit, -limit]) chart.line([i + 0.6, edge], [i + 1.4, edge], "limit");

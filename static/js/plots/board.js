@@ -8,11 +8,12 @@ import { Curve } from "./curve.js";
 import { Curves } from "./curves.js";
 import { HeatMap } from "./heatmap.js";
 import { Matrix } from "./matrix.js";
+import { Note } from "./note.js";
 import { forgetColours } from "./palette.js";
 import { Readouts } from "./readouts.js";
 import { TimeSeries } from "./timeseries.js";
 
-const KINDS = { TimeSeries, Curve, Curves, Bars, Matrix, HeatMap };
+const KINDS = { TimeSeries, Curve, Curves, Bars, Matrix, HeatMap, Note };
 
 export class Board {
   constructor(lab) {

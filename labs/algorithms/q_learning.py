@@ -1,0 +1,39 @@
+"""Q-learning (notes, 3.6.4; Watkins 1989): off-policy, towards the greedy policy's value.
+
+    delta = l + gamma min_u' Q(x', u') - Q(x, u),    Q(x, u) <- Q(x, u) + alpha_n delta
+
+with Q = 0 in terminal states. Whoever chose u, the target is that of the best control in x'."""
+
+import numpy as np
+
+from labs.algorithms.compiled import compiled
+from labs.algorithms.experience import Episode, Problem, Rule, begin, step_size, transition
+from labs.algorithms.exploration import Behavior, choose
+
+
+@compiled
+def q_learning(
+    problem: Problem,
+    behavior: Behavior,
+    rule: Rule,
+    q: np.ndarray,
+    visits: np.ndarray,
+    state: np.ndarray,
+) -> Episode:
+    """One episode. `q` (X, U), `visits` (X, U) and the random `state` change in place."""
+    x, steps, total, discount = begin(problem, state), 0, 0.0, 1.0
+    while steps < problem.horizon and not problem.terminal[x]:
+        u = choose(behavior, x, q[x], visits[x], state)
+        following = transition(problem, x, u, state)
+        target = problem.cost[x, u]
+        if not problem.terminal[following]:
+            target += problem.gamma * q[following].min()
+        visits[x, u] += 1
+        q[x, u] += step_size(rule, visits[x, u]) * (target - q[x, u])
+        total += discount * problem.cost[x, u]
+        discount *= problem.gamma
+        steps += 1
+        if not abs(q[x, u]) <= rule.limit:
+            return Episode(total, steps, False)
+        x = following
+    return Episode(total, steps, True)

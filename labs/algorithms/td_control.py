@@ -1,0 +1,146 @@
+"""Model-free control by temporal differences (notes, 3.6): several learners, each on its own.
+
+`init` knows nothing, `step` learns from some more episodes; both return new learners and leave
+the old ones alone, so that any of them can be looked at again or gone on from, bit for bit. The
+methods are in `q_learning`, `sarsa` and `sarsa_lambda`; what they choose from is in `exploration`.
+The greedy policy of what was learned is u = argmin_u Q(x, u), the first among equals."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from labs.algorithms.compiled import compiled
+from labs.algorithms.experience import Episode, Problem, Rule, begin, transition
+from labs.algorithms.exploration import FOLLOW, Behavior
+from labs.algorithms.q_learning import q_learning
+from labs.algorithms.random_numbers import seeded
+from labs.algorithms.sarsa import sarsa, sarsa_n
+from labs.algorithms.sarsa_lambda import sarsa_lambda
+from labs.errors import LabError
+
+Q_LEARNING, SARSA, SARSA_N, SARSA_LAMBDA = range(4)
+
+
+@dataclass(frozen=True, eq=False)
+class Learners:
+    """S learners of one problem, who differ only in their luck."""
+
+    q: np.ndarray
+    """(S, X, U) what they expect to pay."""
+    visits: np.ndarray
+    """(S, X, U) int32: how often each control was tried in each state."""
+    random: np.ndarray
+    """(S, 4) uint64: the states of their random generators."""
+    costs: np.ndarray
+    """(S, k) discounted cost of each episode of the last step."""
+    lengths: np.ndarray
+    """(S, k) int64: its number of transitions."""
+    sound: bool = True
+    """False once an estimate has left all bounds; `step` then has no effect."""
+
+
+def init(shape: tuple[int, int], seeds: int, rng: np.random.Generator, q0: float = 0.0) -> Learners:
+    """Learners of an MDP of `shape` (X, U) who expect to pay q0 for everything."""
+    return Learners(
+        q=np.full((seeds, *shape), q0),
+        visits=np.zeros((seeds, *shape), np.int32),
+        random=seeded(rng, seeds),
+        costs=np.zeros((seeds, 0)),
+        lengths=np.zeros((seeds, 0), np.int64),
+    )
+
+
+def step(
+    problem: Problem,
+    behavior: Behavior,
+    rule: Rule,
+    method: int,
+    learners: Learners,
+    episodes: int,
+) -> Learners:
+    """The learners after so many further episodes. Raises LabError where the pieces do not fit."""
+    _check(problem, behavior, rule, learners)
+    if not learners.sound:
+        return learners
+    q, visits, random = learners.q.copy(), learners.visits.copy(), learners.random.copy()
+    costs = np.zeros((len(q), episodes))
+    lengths = np.zeros((len(q), episodes), np.int64)
+    sound = _learn(problem, behavior, rule, method, q, visits, random, costs, lengths)
+    return replace(
+        learners, q=q, visits=visits, random=random, costs=costs, lengths=lengths, sound=sound
+    )
+
+
+@compiled
+def _learn(
+    problem: Problem,
+    behavior: Behavior,
+    rule: Rule,
+    method: int,
+    q: np.ndarray,
+    visits: np.ndarray,
+    random: np.ndarray,
+    costs: np.ndarray,
+    lengths: np.ndarray,
+) -> bool:
+    """Fills `costs` and `lengths`; False as soon as a learner's estimates diverge."""
+    for s in range(len(q)):
+        for k in range(costs.shape[1]):
+            if method == Q_LEARNING:
+                episode = q_learning(problem, behavior, rule, q[s], visits[s], random[s])
+            elif method == SARSA:
+                episode = sarsa(problem, behavior, rule, q[s], visits[s], random[s])
+            elif method == SARSA_N:
+                episode = sarsa_n(problem, behavior, rule, q[s], visits[s], random[s])
+            else:
+                episode = sarsa_lambda(problem, behavior, rule, q[s], visits[s], random[s])
+            costs[s, k], lengths[s, k] = episode.cost, episode.steps
+            if not episode.sound:
+                return False
+    return True
+
+
+@compiled
+def walk(problem: Problem, policy: np.ndarray, random: np.ndarray) -> Episode:
+    """One episode under `policy` (X,) int64, with nothing learned. `random` changes in place."""
+    x, steps, total, discount = begin(problem, random), 0, 0.0, 1.0
+    while steps < problem.horizon and not problem.terminal[x]:
+        u = policy[x]
+        total += discount * problem.cost[x, u]
+        discount *= problem.gamma
+        steps += 1
+        x = transition(problem, x, u, random)
+    return Episode(total, steps, True)
+
+
+def greedy_costs(problem: Problem, learners: Learners) -> np.ndarray:
+    """(S,) what one episode under each learner's greedy policy costs. The luck it meets is that
+    of the learner's next episode, which is not used up."""
+    walks = zip(learners.q.argmin(axis=2), learners.random.copy(), strict=True)
+    return np.array([walk(problem, policy, random).cost for policy, random in walks])
+
+
+def _check(problem: Problem, behavior: Behavior, rule: Rule, learners: Learners) -> None:
+    states, controls = problem.cost.shape
+    if learners.q.shape[1:] != (states, controls):
+        raise LabError(
+            f"the learners' Q has {learners.q.shape[1:]} states and controls, the problem "
+            f"{(states, controls)}: they must agree"
+        )
+    if not len(problem.starts) or not (problem.starts < states).all():
+        raise LabError(f"starts = {problem.starts}: takes at least one state below {states}")
+    if len(behavior.policy) != (states if behavior.kind == FOLLOW else 0):
+        raise LabError(
+            f"a policy of {len(behavior.policy)} controls: one for each of {states} states goes"
+        )
+    for name, value in (
+        ("alpha", rule.alpha),
+        ("omega", rule.omega),
+        ("lambda", rule.decay),
+        ("epsilon", behavior.epsilon),
+        ("the decay of exploration", behavior.decay),
+    ):
+        if not 0.0 <= value <= 1.0:
+            raise LabError(f"{name} = {value}: takes a number from 0 to 1")
+    if rule.n < 1 or problem.horizon < 1:
+        raise LabError(f"n = {rule.n}, horizon = {problem.horizon}: both are whole and at least 1")

@@ -1,0 +1,159 @@
+"""Bellman's operators on a finite MDP (notes, 3.4.1), costs minimised.
+
+    (T^pi V)(x) = sum over u of pi(u|x) [ C(x, u) + gamma sum over y of P^u(x, y) V(y) ]
+    (T V)(x)    = min over u of         [ C(x, u) + gamma sum over y of P^u(x, y) V(y) ]
+
+Both contract distances in the max norm by gamma: |T V - T W| <= gamma |V - W|, since the rows of
+P sum to 1. So |V - TV| <= e puts the fixed point within gamma e / (1 - gamma) of TV.
+
+A backup is one bracket: T takes X U of them, T^pi as many as there are controls it may use. Where
+the dynamics are a table the loops are compiled, otherwise they are products of arrays.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from labs.algorithms.compiled import compiled
+from labs.models.finite_mdp import FiniteMDP
+
+TIE = 1e-12
+"""Relative to 1 + |Q|: controls this close are equally good, and the present one is kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Where an iteration stands after a sweep over all states. Steps make new ones: any of them
+    can be kept, looked at and gone on from."""
+
+    V: np.ndarray
+    """(X,) cost-to-go."""
+    policy: np.ndarray
+    """(X,) controls, or (X, U) probabilities where a random policy is (still) followed."""
+    count: int = 0
+    """Sweeps so far."""
+    backups: int = 0
+    """Backups so far."""
+    change: float = np.inf
+    """Largest change of a value in the last sweep."""
+    held: int = 0
+    """Sweeps since the policy was last improved; 0: it is improved next."""
+    done: str = ""
+    """Why it ended, in a sentence; empty while it goes on."""
+
+
+def until_done(step: Callable[[Sweep], Sweep], at: Sweep) -> Iterator[Sweep]:
+    """The sweeps after `at`, the last with `done` set."""
+    while not at.done:
+        at = step(at)
+        yield at
+
+
+def converged(mdp: FiniteMDP, change: float, tolerance: float) -> str:
+    """A sentence once the last sweep changed no value by more than `tolerance`, else empty."""
+    if not change <= tolerance:
+        return ""
+    if mdp.gamma == 1.0:
+        return f"The last sweep changed no value by more than {tolerance:g}."
+    far = error_bound(mdp.gamma, change)
+    return f"No value changed by more than {tolerance:g}: the limit is within {far:.1g}."
+
+
+def error_bound(gamma: float, change: float) -> float:
+    """How far the values can be from the fixed point after a sweep that changed them by
+    `change`, in the max norm; infinite for gamma = 1."""
+    return gamma * change / (1.0 - gamma) if gamma < 1.0 else float("inf")
+
+
+def q_values(mdp: FiniteMDP, V: np.ndarray) -> np.ndarray:
+    """Q (X, U): the brackets. V (X,) may be infinite where nothing ends."""
+    if mdp.successor is not None:
+        table: np.ndarray = mdp.C + mdp.gamma * V[mdp.successor]
+        return table
+    endless = ~np.isfinite(V)
+    Q: np.ndarray = mdp.C + mdp.gamma * (mdp.probabilities @ np.where(endless, 0.0, V)).T
+    if endless.any():
+        Q[(mdp.probabilities @ endless.astype(float)).T > 0.0] = np.inf
+    return Q
+
+
+def optimal_backup(
+    mdp: FiniteMDP, V: np.ndarray, policy: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """T V (X,), a policy greedy with respect to V, which keeps the controls of `policy` (X,)
+    where they are as good as any, and the largest change max |T V - V|."""
+    if mdp.successor is not None:
+        ahead, better = np.empty(mdp.X), np.empty(mdp.X, np.int64)
+        old = policy if policy.ndim == 1 else np.full(mdp.X, -1)
+        change = _minimise(V, mdp.C, mdp.successor, mdp.gamma, old, ahead, better)
+        return ahead, better, change
+    Q = q_values(mdp, V)
+    ahead, better = Q.min(axis=1), Q.argmin(axis=1)
+    if policy.ndim == 1:
+        kept = Q[np.arange(mdp.X), policy] <= ahead + TIE * (1.0 + np.abs(ahead))
+        better = np.where(kept, policy, better)
+    return ahead, better, float(np.abs(ahead - V).max())
+
+
+def policy_backup(
+    mdp: FiniteMDP, V: np.ndarray, policy: np.ndarray
+) -> tuple[np.ndarray, float, int]:
+    """T^pi V (X,), the largest change max |T^pi V - V|, and the backups it took."""
+    if policy.ndim == 1 and mdp.successor is not None:
+        ahead = np.empty(mdp.X)
+        return ahead, _follow(V, mdp.C, mdp.successor, mdp.gamma, policy, ahead), mdp.X
+    if policy.ndim == 1:
+        rows = mdp.probabilities[policy, np.arange(mdp.X)]
+        ahead, backups = mdp.policy_cost(policy) + mdp.gamma * (rows @ V), mdp.X
+    else:
+        ahead, backups = (policy * q_values(mdp, V)).sum(axis=1), mdp.X * mdp.U
+    return ahead, float(np.abs(ahead - V).max()), backups
+
+
+@compiled
+def _minimise(
+    V: np.ndarray,
+    C: np.ndarray,
+    successor: np.ndarray,
+    gamma: float,
+    old: np.ndarray,
+    ahead: np.ndarray,
+    policy: np.ndarray,
+) -> float:
+    """Writes T V into `ahead` and its controls into `policy`; returns the largest change."""
+    X, U = C.shape
+    change = 0.0
+    for x in range(X):
+        best, control = C[x, 0] + gamma * V[successor[x, 0]], 0
+        for u in range(1, U):
+            cost = C[x, u] + gamma * V[successor[x, u]]
+            if cost < best:
+                best, control = cost, u
+        ahead[x] = best
+        policy[x] = control
+        kept = old[x]
+        if kept >= 0:
+            cost = C[x, kept] + gamma * V[successor[x, kept]]
+            if cost <= best + TIE * (1.0 + abs(best)):
+                policy[x] = kept
+        change = max(change, abs(best - V[x]))
+    return change
+
+
+@compiled
+def _follow(
+    V: np.ndarray,
+    C: np.ndarray,
+    successor: np.ndarray,
+    gamma: float,
+    policy: np.ndarray,
+    ahead: np.ndarray,
+) -> float:
+    """Writes T^pi V into `ahead`; returns the largest change."""
+    change = 0.0
+    for x in range(len(V)):
+        u = policy[x]
+        ahead[x] = C[x, u] + gamma * V[successor[x, u]]
+        change = max(change, abs(ahead[x] - V[x]))
+    return change

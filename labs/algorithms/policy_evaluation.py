@@ -1,0 +1,107 @@
+"""Policy evaluation (notes, 3.4.2): the cost-to-go V^pi of a given policy on a finite MDP.
+
+    iteratively    V_(k+1) = T^pi V_k,    |V_k - V^pi| <= gamma^k |V_0 - V^pi|  (max norm)
+    exactly        V^pi = (I - gamma P^pi)^-1 C^pi
+
+Where both the policy and the dynamics are deterministic, the exact value takes no linear solver:
+from every state one path leads into a cycle, of states x_1, ..., x_L say, with the value
+
+    V^pi(x_1) = sum over k of gamma^k l_k / (1 - gamma^L),
+
+and back along the path V^pi(x) = l + gamma V^pi(x'). With gamma = 1 a state from which the policy
+never comes to rest at no cost has no finite cost-to-go: its value is infinite.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from labs.algorithms.bellman import Sweep, converged, policy_backup, until_done
+from labs.algorithms.compiled import compiled
+from labs.models.finite_mdp import FiniteMDP
+
+
+def init(V: np.ndarray, policy: np.ndarray) -> Sweep:
+    """Before the first sweep: V (X,), policy (X,) or (X, U)."""
+    return Sweep(V, policy)
+
+
+def step(mdp: FiniteMDP, at: Sweep, tolerance: float) -> Sweep:
+    """One sweep of T^pi over all states."""
+    V, change, backups = policy_backup(mdp, at.V, at.policy)
+    done = converged(mdp, change, tolerance)
+    return Sweep(V, at.policy, at.count + 1, at.backups + backups, change, at.held + 1, done)
+
+
+def iterate(mdp: FiniteMDP, V: np.ndarray, policy: np.ndarray, tolerance: float) -> Iterator[Sweep]:
+    """Sweep by sweep until none changes a value by more than `tolerance`."""
+    return until_done(lambda at: step(mdp, at, tolerance), init(V, policy))
+
+
+def exact(mdp: FiniteMDP, policy: np.ndarray) -> np.ndarray:
+    """V^pi (X,). A random policy or random dynamics take a dense (X, X) matrix: for small MDPs."""
+    if policy.ndim == 1 and mdp.successor is not None:
+        V = np.empty(mdp.X)
+        rows = np.arange(mdp.X)
+        _follow_to_the_end(mdp.C[rows, policy], mdp.successor[rows, policy], mdp.gamma, V)
+        return V
+    matrix, cost = mdp.transition_matrix(policy), mdp.policy_cost(policy)
+    if mdp.gamma < 1.0:
+        return np.asarray(np.linalg.solve(np.eye(mdp.X) - mdp.gamma * matrix, cost))
+    ends = _ends_surely(matrix, mdp.terminal)
+    V = np.where(mdp.terminal, 0.0, np.inf)
+    on = np.ix_(ends, ends)
+    V[ends] = np.linalg.solve(np.eye(int(ends.sum())) - matrix[on], cost[ends])
+    return V
+
+
+def _ends_surely(matrix: np.ndarray, terminal: np.ndarray) -> np.ndarray:
+    """(X,) bool: the states, not terminal, from which the chain ends with probability 1: they
+    lead to none from where no terminal state can be reached."""
+    lost = ~_leads_to(matrix, terminal)
+    return np.asarray(~_leads_to(matrix, lost) & ~terminal)
+
+
+def _leads_to(matrix: np.ndarray, goal: np.ndarray) -> np.ndarray:
+    """(X,) bool: from where the chain may come into `goal`, those in it included."""
+    found = goal
+    while True:
+        more = found | (matrix @ found > 0.0)
+        if (more == found).all():
+            return found
+        found = more
+
+
+@compiled
+def _follow_to_the_end(cost: np.ndarray, ahead: np.ndarray, gamma: float, V: np.ndarray) -> None:
+    """Writes V^pi for one next state `ahead` (X,) and one cost (X,) a state."""
+    new, on_path, known = 0, 1, 2
+    mark = np.zeros(len(V), np.int8)
+    path = np.empty(len(V), np.int64)
+    for start in range(len(V)):
+        x, length = start, 0
+        while mark[x] == new:
+            mark[x] = on_path
+            path[length] = x
+            length += 1
+            x = ahead[x]
+        if mark[x] == on_path:  # a cycle that nobody has met before
+            total, weight, idle, y = 0.0, 1.0, True, x
+            while True:
+                total += weight * cost[y]
+                weight *= gamma
+                idle = idle and cost[y] == 0.0
+                y = ahead[y]
+                if y == x:
+                    break
+            if idle:
+                V[x] = 0.0
+            else:
+                V[x] = total / (1.0 - weight) if gamma < 1.0 else total * np.inf
+            mark[x] = known
+        while length:
+            length -= 1
+            y = path[length]
+            if mark[y] != known:
+                V[y] = cost[y] + gamma * V[ahead[y]]
+                mark[y] = known

@@ -1,0 +1,72 @@
+"""Policy iteration and modified policy iteration (notes, 3.4.3) on a finite MDP.
+
+    improve     pi_k(x) in argmin over u of C(x, u) + gamma sum over y of P^u(x, y) V_k(y)
+    evaluate    V_(k+1) = (T^(pi_k))^m V_k
+
+The sweep that improves a policy finds T V_k = T^(pi_k) V_k, the first of its m evaluations. So
+m = 1 is value iteration, sweep for sweep; m = infinity (until a sweep changes no value by more
+than the tolerance) is policy iteration, which begins with evaluating a given policy. X U backups
+for a sweep that improves, X for one that evaluates.
+
+`optimum` is policy iteration with exact evaluation: finitely many steps, no tolerance (Howard
+1960).
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from labs.algorithms.bellman import Sweep, converged, optimal_backup, policy_backup, until_done
+from labs.algorithms.policy_evaluation import exact
+from labs.errors import LabError
+from labs.models.finite_mdp import FiniteMDP
+
+MOST = 10_000
+"""Improvements at most in `optimum`."""
+
+
+def init(V: np.ndarray, policy: np.ndarray | None = None) -> Sweep:
+    """Before the first sweep: V (X,). A policy, (X,) or (X, U), is evaluated first; without one
+    the first sweep makes one."""
+    if policy is None:
+        return Sweep(V, np.zeros(len(V), np.int64))
+    return Sweep(V, policy, held=1)
+
+
+def step(mdp: FiniteMDP, at: Sweep, m: float, tolerance: float) -> Sweep:
+    """One sweep, which improves the policy or evaluates it. m >= 1, `math.inf` for policy
+    iteration."""
+    if at.held == 0:
+        V, policy, change = optimal_backup(mdp, at.V, at.policy)
+        held = 1 if m > 1 else 0
+        backups, done = mdp.X * mdp.U, converged(mdp, change, tolerance)
+    else:
+        V, change, backups = policy_backup(mdp, at.V, at.policy)
+        policy, done = at.policy, ""
+        held = 0 if at.held + 1 >= m or change <= tolerance else at.held + 1
+    return Sweep(V, policy, at.count + 1, at.backups + backups, change, held, done)
+
+
+def iterate(
+    mdp: FiniteMDP,
+    V: np.ndarray,
+    policy: np.ndarray | None,
+    m: float,
+    tolerance: float,
+) -> Iterator[Sweep]:
+    """Sweep by sweep until one that improves changes no value by more than `tolerance`."""
+    return until_done(lambda at: step(mdp, at, m, tolerance), init(V, policy))
+
+
+def optimum(mdp: FiniteMDP, policy: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """V* (X,) and an optimal policy (X,) to rounding, and the improvements it took to get there
+    from `policy`, (X,) or (X, U). With gamma = 1 and random dynamics, that policy has to end from
+    wherever any can; V* is infinite from where none does."""
+    for count in range(MOST):
+        V = exact(mdp, policy)
+        with np.errstate(invalid="ignore"):  # infinite values that stay so do not change
+            _, better, _ = optimal_backup(mdp, V, policy)
+        if policy.ndim == 1 and (better == policy).all():
+            return V, policy, count
+        policy = better
+    raise LabError(f"policy iteration still changes the policy after {MOST} improvements")

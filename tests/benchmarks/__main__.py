@@ -5,7 +5,7 @@ Figures of one run stand side by side; compare ratios, not seconds, across machi
 import argparse
 import platform
 
-from tests.benchmarks import headless, latency, load
+from tests.benchmarks import dynamic_programming, headless, latency, load
 
 MEASURES = {
     "headless": headless.ratio_to_bare_calls,
@@ -14,6 +14,7 @@ MEASURES = {
     "page": latency.page_to_motion,
     "twelve": load.twelve,
     "growing": load.growing,
+    "dynamic-programming": dynamic_programming.on_the_pendulum,
 }
 
 

@@ -1,0 +1,104 @@
+"""A training: learners of one or two methods side by side, and the curves of their progress.
+
+Both methods begin with the same luck, so that what differs between them is the method. A training
+is a mapping of arrays, M methods with S learners each, after k batches of episodes:
+
+    q, visits, random          the learners (labs/algorithms/td_control.py), with M in front
+    cells (X, 2)               the cells of the map the states stand for
+    sound ()                   whether the estimates stayed within bounds
+    episodes (k,)              each learner's episodes so far
+    online (M, S, k)           mean discounted cost of a batch's episodes: what learning cost
+    offline (M, S, k)          cost of the greedy policy after it: what was learned
+    off, most (M, S, k)        root mean square and largest of |Q - Q*|
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from labs.algorithms.experience import Rule
+from labs.algorithms.exploration import Behavior
+from labs.algorithms.td_control import Learners, greedy_costs, init, step
+from labs.models.learning_tasks import Task
+
+Training = Mapping[str, np.ndarray]
+CURVES = ("online", "offline", "off", "most")
+KEPT = 1000
+"""Batches whose curves are kept; older ones are dropped."""
+
+
+def begin(task: Task, methods: int, seeds: int, rng: np.random.Generator, q0: float) -> Training:
+    """Nothing learned yet: Q = q0 everywhere."""
+    learners = init((task.mdp.X, task.mdp.U), seeds, rng, q0)
+    return {
+        "q": np.stack([learners.q] * methods),
+        "visits": np.stack([learners.visits] * methods),
+        "random": np.stack([learners.random] * methods),
+        "cells": task.cells,
+        "sound": np.array(True),
+        "episodes": np.zeros(0),
+    } | {name: np.zeros((methods, seeds, 0)) for name in CURVES}
+
+
+def learners_of(training: Training, method: int) -> Learners:
+    """The learners of one of the methods."""
+    q, visits, random = (training[name][method] for name in ("q", "visits", "random"))
+    none = np.zeros((len(q), 0))
+    return Learners(q, visits, random, none, none.astype(np.int64), bool(training["sound"]))
+
+
+def further(
+    task: Task,
+    behavior: Behavior,
+    rule: Rule,
+    methods: Sequence[int],
+    training: Training,
+    episodes: int,
+) -> Training:
+    """The training after a batch of so many further episodes."""
+    after = [
+        step(task.practice, behavior, rule, method, learners_of(training, m), episodes)
+        for m, method in enumerate(methods)
+    ]
+    errors = np.array([[task.errors(q) for q in learners.q] for learners in after])
+    points = {
+        "online": np.array([learners.costs.mean(axis=1) for learners in after]),
+        "offline": np.array([greedy_costs(task.trial, learners) for learners in after]),
+        "off": errors[..., 0],
+        "most": errors[..., 1],
+    }
+    done = trained(training) + episodes
+    return {
+        "q": np.stack([learners.q for learners in after]),
+        "visits": np.stack([learners.visits for learners in after]),
+        "random": np.stack([learners.random for learners in after]),
+        "cells": task.cells,
+        "sound": np.array(all(learners.sound for learners in after)),
+        "episodes": np.append(training["episodes"], float(done))[-KEPT:],
+    } | {
+        name: np.concatenate([training[name], point[..., None]], axis=2)[..., -KEPT:]
+        for name, point in points.items()
+    }
+
+
+def trained(training: Training) -> int:
+    """Each learner's episodes so far."""
+    return int(training["episodes"][-1]) if len(training["episodes"]) else 0
+
+
+def fits(training: Training, task: Task) -> bool:
+    """Whether its tables are those of this task's states and controls."""
+    same = training["q"].shape[2:] == task.q_star.shape
+    return same and np.array_equal(training["cells"], task.cells)
+
+
+def moved(training: Training, task: Task, q0: float) -> Training:
+    """The training on a map that was changed: what was learned of a cell stays with the cell."""
+    places = {tuple(cell): x for x, cell in enumerate(training["cells"].tolist())}
+    shared = [(x, places[c]) for x, c in enumerate(map(tuple, task.cells.tolist())) if c in places]
+    new, old = np.array(shared, int).reshape(-1, 2).T
+    q = np.full((*training["q"].shape[:2], *task.q_star.shape), q0)
+    visits = np.zeros(q.shape, np.int32)
+    q[:, :, new] = training["q"][:, :, old]
+    visits[:, :, new] = training["visits"][:, :, old]
+    return {**training, "q": q, "visits": visits, "cells": task.cells}

@@ -1,7 +1,9 @@
 """Boards of cells and coloured surfaces on Viser: what a table of values looks like."""
 
 import json
+import time
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -12,8 +14,12 @@ from server.nodes import Node
 
 GAP = 0.06
 """The part of a cell's side that stays free."""
-SWAP = 0.1
-"""[s] A viewer has to prepare a surface before it is shown in place of the last one."""
+CELLS_EVERY = 0.09
+"""[s] Between two updates of a board's colours."""
+SURFACE_EVERY = 0.19
+"""[s] Between two updates of a surface: they are long messages."""
+PREPARED = 0.12
+"""[s] A viewer has to prepare a surface it was sent, before it shows it."""
 
 Clicked = Callable[[tuple[float, float, float]], None]
 
@@ -54,82 +60,120 @@ class CellsNode(Node):
 
             board.on_click(on_click)
         super().__init__(board)
+        self._when = 0.0
 
     def paint(self, colors: np.ndarray) -> None:
-        self.send("batched_colors", _bytes(colors))
+        """Gives the cells these colours."""
+        now = time.monotonic()
+        if now - self._when > CELLS_EVERY:
+            self._when = now
+            self.send("batched_colors", _bytes(colors))
+
+
+class SurfaceNode(Node):
+    """A surface, in two copies: a viewer needs some time to prepare one it is sent, and shows the
+    other meanwhile."""
+
+    def __init__(
+        self, server: viser.ViserServer, name: str, points: np.ndarray, colors: np.ndarray
+    ) -> None:
+        super().__init__(server.scene.add_frame(f"/{name}", show_axes=False))
+        data = glb(points, colors)
+        self._shown, self._hidden = (
+            server.scene.add_glb(f"/{name}/{copy}", data, visible=copy == 0, cast_shadow=False)
+            for copy in range(2)
+        )
+        # A speck that stays: while something wears a shader, the viewer need not compile it again.
+        speck = np.broadcast_to(points.reshape(-1, 3).mean(axis=0), (2, 2, 3))
+        server.scene.add_glb(f"/{name}/speck", glb(speck, np.ones((2, 2, 3))), cast_shadow=False)
+        self._last = np.stack([points, colors])
+        self._when = time.monotonic()
+        self._preparing = False
+
+    def draw(self, points: np.ndarray, colors: np.ndarray) -> None:
+        """Sends what changed, and shows what was sent some time ago."""
+        since = time.monotonic() - self._when
+        if self._preparing and since > PREPARED:
+            self._shown.visible, self._hidden.visible = False, True
+            self._shown, self._hidden = self._hidden, self._shown
+            self._preparing = False
+        now = np.stack([points, colors])
+        if since > SURFACE_EVERY and not np.array_equal(now, self._last):
+            self._hidden.glb_data = glb(points, colors)
+            self._last = now
+            self._when = time.monotonic()
+            self._preparing = True
 
 
 def glb(points: np.ndarray, colors: np.ndarray) -> bytes:
     """A surface through `points` (rows, columns, 3) with a colour (rows, columns, 3) a point, in
-    binary glTF; the viewer adds the normals."""
-    rows, columns, _ = points.shape
-    number = np.arange(rows * columns, dtype=np.uint32).reshape(rows, columns)
-    a, b, c, d = number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]
-    faces = np.stack([a, d, c, a, c, b], axis=-1).astype(np.uint32)
+    binary glTF 2.0. The viewer computes the normals."""
     corners = points.reshape(-1, 3).astype("<f4")
-    linear = np.ones((rows * columns, 4))
-    linear[:, :3] = _linear(colors.reshape(-1, 3))
-    tints = np.round(65535 * linear).astype("<u2")
+    faces = _faces(*points.shape[:2])
+    tints = np.full((len(corners), 4), 65535, "<u2")
+    tints[:, :3] = np.round(65535 * _linear(colors.reshape(-1, 3)))
     parts = [corners.tobytes(), tints.tobytes(), faces.tobytes()]
-    starts = np.cumsum([0, *map(len, parts)])
-    count = rows * columns
+    starts = np.cumsum([0, *map(len, parts)]).tolist()
+    float32, uint16, uint32 = 5126, 5123, 5125
+    points_of = {"componentType": float32, "count": len(corners), "type": "VEC3"}
+    attributes = {"POSITION": 0, "COLOR_0": 1, "NORMAL": 2}
     document = {
         "asset": {"version": "2.0"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [{"mesh": 0}],
-        "meshes": [
-            {
-                "primitives": [
-                    {
-                        "attributes": {"POSITION": 0, "COLOR_0": 1, "NORMAL": 3},
-                        "indices": 2,
-                        "material": 0,
-                    }
-                ]
-            }
-        ],
+        "meshes": [{"primitives": [{"attributes": attributes, "indices": 3, "material": 0}]}],
         "materials": [
             {
                 "doubleSided": True,
                 "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 1.0},
             }
         ],
-        "buffers": [{"byteLength": int(starts[-1])}],
+        "buffers": [{"byteLength": starts[-1]}],
         "bufferViews": [
-            {"buffer": 0, "byteOffset": int(start), "byteLength": len(part)}
+            {"buffer": 0, "byteOffset": start, "byteLength": len(part)}
             for start, part in zip(starts, parts, strict=False)
         ],
         "accessors": [
-            {
+            points_of
+            | {
                 "bufferView": 0,
-                "componentType": 5126,
-                "count": count,
-                "type": "VEC3",
                 "min": corners.min(axis=0).tolist(),
                 "max": corners.max(axis=0).tolist(),
             },
             {
                 "bufferView": 1,
-                "componentType": 5123,
+                "componentType": uint16,
                 "normalized": True,
-                "count": count,
+                "count": len(tints),
                 "type": "VEC4",
             },
-            {"bufferView": 2, "componentType": 5125, "count": faces.size, "type": "SCALAR"},
-            # Without data these are zeros: the viewer computes them, smooth ones.
-            {"componentType": 5126, "count": count, "type": "VEC3"},
+            # Without data these are zeros: asked for here, computed there. A mesh that does not
+            # ask is drawn facet by facet.
+            points_of,
+            {
+                "bufferView": 2,
+                "componentType": uint16 if faces.dtype == "<u2" else uint32,
+                "count": faces.size,
+                "type": "SCALAR",
+            },
         ],
     }
     text = json.dumps(document, separators=(",", ":")).encode()
-    text += b" " * (-len(text) % 4)
-    binary = b"".join(parts)
-    binary += b"\0" * (-len(binary) % 4)
-    chunks = _chunk(text, b"JSON") + _chunk(binary, b"BIN\0")
+    chunks = _chunk(b"JSON", text, b" ") + _chunk(b"BIN\0", b"".join(parts), b"\0")
     return b"glTF" + np.array([2, 12 + len(chunks)], "<u4").tobytes() + chunks
 
 
-def _chunk(data: bytes, kind: bytes) -> bytes:
+@lru_cache(maxsize=8)
+def _faces(rows: int, columns: int) -> np.ndarray:
+    """Two triangles for every four neighbours in a grid of points."""
+    number = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]
+    return np.stack([a, d, c, a, c, b], axis=-1).astype("<u2" if number.size < 65535 else "<u4")
+
+
+def _chunk(kind: bytes, data: bytes, filler: bytes) -> bytes:
+    data += filler * (-len(data) % 4)
     return np.array([len(data)], "<u4").tobytes() + kind + data
 
 

@@ -17,13 +17,13 @@ from labs.models.arms import Arm
 from labs.run import World
 from labs.scene import Color
 from server import meshes
-from server.boards import CellsNode, glb
+from server.boards import CellsNode, SurfaceNode
 from server.mailbox import Mailbox
 from server.messages import View
 from server.nodes import COLORS, ArmNode, Node
 
 TRAIL_EVERY = 3
-"""Frames between two updates of a trail: they are long messages."""
+"""Frames between two updates of a trail or of many arrows: they are long messages."""
 
 
 class ViserScene:
@@ -250,12 +250,12 @@ class ViserScene:
         node.paint(colors)
 
     def surface(self, name: str, points: np.ndarray, colors: np.ndarray) -> None:
-        data = glb(points, colors)
-
         def make() -> Node:
-            return Node(self._server.scene.add_glb(f"/{name}", data, cast_shadow=False))
+            return SurfaceNode(self._server, name, points, colors)
 
-        self._node(name, "surface", make).send("glb_data", data)
+        node = self._node(name, "surface", make)
+        assert isinstance(node, SurfaceNode)
+        node.draw(points, colors)
 
     def arrows(
         self, name: str, starts: np.ndarray, ends: np.ndarray, color: Color = "force"
@@ -279,7 +279,9 @@ class ViserScene:
                 )
             )
 
-        self._node(name, (color, head), make).send("points", points)
+        node = self._node(name, (color, head), make)
+        if self._frame % TRAIL_EVERY == 0:
+            node.send("points", points)
 
     # Nodes ----------------------------------------------------------------------------------
 

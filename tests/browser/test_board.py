@@ -1,0 +1,59 @@
+"""Tables in the scene: a click on a cell of a board changes what the map says."""
+
+import re
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import numpy as np
+from playwright.sync_api import Page, expect
+
+from tests.browser.conftest import screenshot
+from tests.browser.lab_page import LabPage
+
+
+def middle(page: Page) -> tuple[float, float]:
+    """Of the scene: what its camera looks at."""
+    boxes = [c.bounding_box() for c in page.frame_locator("#robot").locator("canvas").all()]
+    box: Any = max(filter(None, boxes), key=lambda b: b["width"] * b["height"])
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def test_a_click_on_a_cell_changes_the_map(page: Page) -> None:
+    lab = LabPage(page).open("board")
+    page.wait_for_timeout(3000)  # software rendering takes its time to draw the first board
+    before = lab.status()["params"]["map"].split("\n")
+    assert before[2][4] == "#"
+    page.mouse.click(*middle(page))
+    freed = [*before[:2], before[2][:4] + "." + before[2][5:], *before[3:]]
+    expect(lab.value("map")).to_have_value("\n".join(freed))
+    expect(lab.scene.get_by_role("textbox").first).to_have_value("\n".join(freed))
+    expect(page).to_have_url(re.compile("map="))
+    assert parse_qs(urlsplit(page.url).query)["map"] == ["\n".join(freed)]
+    screenshot(page, "board")
+    page.mouse.click(*middle(page))
+    expect(lab.value("map")).to_have_value("\n".join(before))
+
+
+def test_a_board_waves_and_a_surface_over_it(page: Page) -> None:
+    lab = LabPage(page).open("board", "?rate=5")
+    page.wait_for_timeout(3000)
+    seen = [lab.pixels("#robot")]
+    for _ in range(8):
+        page.wait_for_timeout(250)
+        seen.append(lab.pixels("#robot"))
+    assert max(np.abs(now - seen[0]).max() for now in seen[1:]) > 60, "the colours move"
+    colored = [(np.ptp(image, axis=2) > 30).mean() for image in seen]
+    assert min(colored) > 0.7 * max(colored), "the surface never blinks while it is replaced"
+
+
+def test_a_long_text_is_a_link(page: Page) -> None:
+    """3999 characters: about as many as a text may have."""
+    rows = "\n".join(["." * 39] * 99 + ["#" * 39])
+    lab = LabPage(page).open("board")
+    lab.value("map").fill(rows)
+    lab.value("map").blur()
+    expect(page).to_have_url(re.compile("map=.{3999}"))
+    page.reload()
+    lab.wait_live()
+    expect(lab.value("map")).to_have_value(rows)
+    assert lab.status()["params"]["map"] == rows

@@ -1,0 +1,196 @@
+"""Markov chains and Markov reward processes on finitely many states (notes, 3.3.1 and 3.3.2).
+
+P (X, X) holds in row x the probabilities of going from x to each state; every row sums to 1.
+A distribution over the states is a row that moves with P, costs-to-go are a column that P
+averages:
+
+    mu_(k+1) = mu_k P                   where the state is after k + 1 steps, (X,)
+    pi = pi P,  sum of pi = 1           a stationary distribution
+    V = C + gamma P V                   so that V = (I - gamma P)^-1 C, costs C (X,)
+    V_(k+1) = C + gamma P V_k           the same by iteration, max|V_k - V| <= gamma^k max|V_0 - V|
+
+States that lead to one another form a communicating class. A class nobody leaves is closed; each
+closed class has one stationary distribution, and P has the eigenvalue 1 once for each. If the
+returns to a class take multiples of d > 1 steps only, it has the period d, and P has all d-th
+roots of 1 as eigenvalues; otherwise all the rest lies inside the unit circle (Perron-Frobenius).
+
+With gamma = 1, I - P is singular: 1 is an eigenvalue of P. V exists all the same where the chain
+is sure to end in states that cost nothing (V = 0 there; without them the system is regular).
+Anywhere else costs are added for ever.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
+TOLERANCE = 1e-9
+"""Error of V, relative to its largest entry, that ends the iteration."""
+
+
+@dataclass(frozen=True, eq=False)
+class Class:
+    """States that lead to one another."""
+
+    states: np.ndarray
+    """Their indices, ascending."""
+    closed: bool
+    """Whether nothing leads out of it."""
+    period: int
+    """Greatest common divisor of the lengths of all ways back; 0 where there is no way back."""
+
+
+@dataclass(frozen=True, eq=False)
+class CostToGo:
+    """What starting in each state costs in all."""
+
+    V: np.ndarray
+    """(X,); 0 where the costs have no finite sum."""
+    finite: np.ndarray
+    """(X,) bool: where they have one. All of them for gamma < 1."""
+
+
+def communicating_classes(P: np.ndarray) -> list[Class]:
+    """The classes of P, by their first states."""
+    _, label = connected_components(P > 0.0, connection="strong")
+    groups = [np.flatnonzero(label == k) for k in range(label.max() + 1)]
+    return [
+        Class(states, not np.delete(P[states], states, axis=1).any(), _period(P, states))
+        for states in sorted(groups, key=lambda states: int(states[0]))
+    ]
+
+
+def _period(P: np.ndarray, states: np.ndarray) -> int:
+    """Levels l by breadth first: every transition x -> x' within the class closes ways whose
+    lengths differ by l(x) + 1 - l(x')."""
+    inside = P[np.ix_(states, states)] > 0.0
+    level = np.full(len(states), -1)
+    level[0], front = 0, [0]
+    while front:
+        x = front.pop(0)
+        fresh = np.flatnonzero(inside[x] & (level < 0))
+        level[fresh] = level[x] + 1
+        front.extend(map(int, fresh))
+    start, end = np.nonzero(inside)
+    return int(np.gcd.reduce(level[start] + 1 - level[end])) if len(start) else 0
+
+
+def is_irreducible(classes: list[Class]) -> bool:
+    """Whether every state leads to every other."""
+    return len(classes) == 1
+
+
+def stationary(P: np.ndarray, closed: Class) -> np.ndarray:
+    """pi (X,), the only stationary distribution that lives on a closed class: elimination
+    without any subtraction (Grassmann, Taksar and Heyman 1985), exact to rounding in each entry."""
+    A = P[np.ix_(closed.states, closed.states)].copy()
+    n = len(A)
+    for k in range(n - 1, 0, -1):
+        A[:k, k] /= A[k, :k].sum()
+        A[:k, :k] += np.outer(A[:k, k], A[k, :k])
+    weights = np.ones(n)
+    for k in range(1, n):
+        weights[k] = weights[:k] @ A[:k, k]
+    pi = np.zeros(len(P))
+    pi[closed.states] = weights / weights.sum()
+    return pi
+
+
+def absorption(P: np.ndarray, classes: list[Class]) -> np.ndarray:
+    """(X, K) probabilities of ending in each of the K closed classes, by the state of the start:
+    B = (I - P_TT)^-1 P_TR for the transient states T, those of classes that are not closed."""
+    closed = [c for c in classes if c.closed]
+    ends = np.zeros((len(P), len(closed)))
+    for k, c in enumerate(closed):
+        ends[c.states, k] = 1.0
+    transient = np.flatnonzero(ends.sum(axis=1) == 0.0)
+    inner = np.eye(len(transient)) - P[np.ix_(transient, transient)]
+    ends[transient] = np.linalg.solve(inner, P[transient] @ ends)
+    return ends
+
+
+def long_run(P: np.ndarray, classes: list[Class]) -> np.ndarray:
+    """(X, X), in row x the share of time spent in each state in the long run by one who starts
+    in x: the limit of (I + P + ... + P^(n-1)) / n, which exists for every P."""
+    shares = np.stack([stationary(P, c) for c in classes if c.closed])
+    mixed: np.ndarray = absorption(P, classes) @ shares
+    return mixed
+
+
+def eigenvalues(P: np.ndarray) -> np.ndarray:
+    """(X,) complex, the largest magnitude first, and of one magnitude the largest real part."""
+    found = np.linalg.eigvals(P).astype(complex)
+    order = np.lexsort((found.imag, -found.real.round(9), -np.abs(found).round(9)))
+    ordered: np.ndarray = found[order]
+    return ordered
+
+
+def cost_to_go(P: np.ndarray, C: np.ndarray, gamma: float, classes: list[Class]) -> CostToGo:
+    """V (X,) = (I - gamma P)^-1 C, gamma in [0, 1]; see the top for gamma = 1."""
+    if gamma < 1.0:
+        V = np.linalg.solve(np.eye(len(P)) - gamma * P, C)
+        return CostToGo(V, np.ones(len(P), bool))
+    closed = [c for c in classes if c.closed]
+    costly = np.array([bool(C[c.states].any()) for c in closed])
+    finite = absorption(P, classes)[:, costly].sum(axis=1) == 0.0
+    ended = np.isin(np.arange(len(P)), np.concatenate([c.states for c in closed]))
+    left = np.flatnonzero(finite & ~ended)
+    V = np.zeros(len(P))
+    V[left] = np.linalg.solve(np.eye(len(left)) - P[np.ix_(left, left)], C[left])
+    return CostToGo(V, finite)
+
+
+def mean_costs(
+    P: np.ndarray, C: np.ndarray, gammas: np.ndarray, classes: list[Class]
+) -> np.ndarray:
+    """(len(gammas), X): (1 - gamma) V, the costs ahead averaged with weights (1 - gamma) gamma^k
+    that sum to 1. C itself at gamma = 0; at gamma = 1, by Abel's theorem, the mean cost of a step
+    in the long run."""
+    near = gammas < 1.0
+    means = np.empty((len(gammas), len(P)))
+    means[~near] = long_run(P, classes) @ C
+    systems = np.eye(len(P)) - gammas[near, None, None] * P
+    weighed = (1.0 - gammas[near])[:, None, None] * C[:, None]
+    means[near] = np.linalg.solve(systems, weighed)[:, :, 0]
+    return means
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """V_k (X,), and the errors up to it."""
+
+    V: np.ndarray
+    errors: np.ndarray
+    """(k + 1,) max|V_j - V| for j = 0..k; empty where V is not finite everywhere."""
+    bounds: np.ndarray
+    """(k + 1,) gamma^j max|V_0 - V|; empty as well."""
+    done: str
+    """Why the iteration stopped, in a sentence; empty while it goes on."""
+    progress: float
+    """In [0, 1]: of the decades of error or of the sweeps, whichever is ahead."""
+
+
+def evaluate(
+    P: np.ndarray, C: np.ndarray, gamma: float, V: np.ndarray, exact: CostToGo, most: int
+) -> Iterator[Sweep]:
+    """V_1, V_2, ... from V_0 = `V` (X,) by V_(k+1) = C + gamma P V_k, until V is exact to
+    TOLERANCE of its largest entry or `most` sweeps are done."""
+    sums = bool(exact.finite.all())
+    gap = float(np.abs(V - exact.V).max())
+    goal = TOLERANCE * (1.0 + float(np.abs(exact.V).max()))
+    errors = [gap] if sums else []
+    for k in range(1, most + 1):
+        V, done, progress = C + gamma * (P @ V), "", k / most
+        if sums:
+            errors.append(float(np.abs(V - exact.V).max()))
+        if sums and errors[-1] <= goal:
+            done, progress = f"V is exact to nine digits, k = {k}.", 1.0
+        elif k == most:
+            left = f"an error of {errors[-1]:.2g} is left" if sums else "V has no limit"
+            done = f"Stopped at k = {k}: {left}."
+        elif sums and gap > goal:
+            progress = max(progress, float(np.log(gap / errors[-1]) / np.log(gap / goal)))
+        yield Sweep(V, np.array(errors), gap * gamma ** np.arange(len(errors)), done, progress)
+        if done:
+            return

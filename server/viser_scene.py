@@ -241,9 +241,8 @@ class ViserScene:
             self._mailbox.put("hold", handle=name, point=None)
 
         def make() -> Node:
-            return CellsNode(
-                self._server, name, corner, size, colors, clicked if clickable else None
-            )
+            on_click = clicked if clickable else None
+            return CellsNode(self._server, name, corner, size, colors, on_click, self._view)
 
         node = self._node(name, (corner, size, colors.shape, clickable), make)
         assert isinstance(node, CellsNode)
@@ -251,7 +250,7 @@ class ViserScene:
 
     def surface(self, name: str, points: np.ndarray, colors: np.ndarray) -> None:
         def make() -> Node:
-            return SurfaceNode(self._server, name, points, colors)
+            return SurfaceNode(self._server, name, points, colors, self._view)
 
         node = self._node(name, "surface", make)
         assert isinstance(node, SurfaceNode)

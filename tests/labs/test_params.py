@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from labs.errors import ParameterError
-from labs.params import LOG_SPAN, Knob, Params, Scale, choice, knob, toggle
+from labs.params import LOG_SPAN, LONGEST_TEXT, Knob, Params, Scale, choice, knob, text, toggle
 
 
 class Sample(Params):
@@ -196,6 +196,29 @@ def test_a_subclass_keeps_the_tunables_of_its_base() -> None:
         mass: float = knob(1.0, 0.1, 2.0, symbol="m", unit="kg", help="Mass.")
 
     assert list(More.tunables) == [*Sample.tunables, "mass"]
+
+
+# Texts ----------------------------------------------------------------------------------------
+
+
+class Texts(Params):
+    short: str = text("a", help="S.", label="S")
+    long: str = text("b", help="L.", label="L", most=LONGEST_TEXT)
+
+
+@pytest.mark.parametrize(("name", "most"), [("short", 400), ("long", 4000)])
+def test_a_text_has_a_length(name: str, most: int) -> None:
+    assert getattr(Texts().change({name: "é" * most}), name) == "é" * most
+    with pytest.raises(ParameterError, match=f"{name} = .*at most {most} characters"):
+        Texts().change({name: "é" * (most + 1)})
+    described = {tunable["name"]: tunable["most"] for tunable in Texts.describe()}
+    assert described[name] == most
+
+
+@pytest.mark.parametrize("most", [0, LONGEST_TEXT + 1])
+def test_no_text_is_longer_than_a_link(most: int) -> None:
+    with pytest.raises(ValueError, match="from 1 to 4000"):
+        text("a", help="T.", label="T", most=most)
 
 
 # Text and JSON --------------------------------------------------------------------------------

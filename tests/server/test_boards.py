@@ -1,0 +1,188 @@
+"""Tables in the scene: boards that are clicked, surfaces, and many arrows at once."""
+
+import io
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+import viser
+
+from server import boards
+from server.boards import SurfaceNode, glb
+from server.mailbox import Mailbox
+from server.messages import View
+from server.viser_scene import ViserScene
+from tests.served import Served
+from tests.viser_client import SceneClient, message
+
+LOW = View(graphics="low")
+
+
+@pytest.fixture
+def server() -> Iterator[viser.ViserServer]:
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    yield server
+    server.stop()
+
+
+def click(x: float, y: float) -> bytes:
+    """On the board of the sample lab, along a ray that falls slantwise on (x, y, 0.02)."""
+    return message(
+        "SceneNodeClickMessage",
+        name="/board",
+        instance_index=0,
+        ray_origin=(x + 0.5, y - 1.0, 2.02),
+        ray_direction=(-0.25, 0.5, -1.0),
+        screen_pos=(0.5, 0.5),
+        modifier=None,
+        owner="",
+    )
+
+
+# Boards ---------------------------------------------------------------------------------------
+
+
+def test_a_click_on_a_board_is_an_edit(served: Served) -> None:
+    with served.session("board") as session, SceneClient(session) as scene:
+        rows = session.info["params"]["map"].split("\n")
+        assert rows[2][4] == "#"
+        freed = "\n".join([*rows[:2], rows[2][:4] + "." + rows[2][5:], *rows[3:]])
+        scene.wait_for_node("/board")
+        scene.socket.send(click(0.05, 0.05))
+        scene.shows("Map", freed)
+        scene.socket.send(click(0.05, 0.05))
+        scene.shows("Map", "\n".join(rows))
+        scene.socket.send(click(0.05, 0.45))  # beside the board
+        scene.socket.send(click(-0.35, -0.25))
+        scene.shows("Map", "\n".join([*rows[:5], "#" + rows[5][1:]]))
+
+
+def test_a_click_is_never_lost_among_others() -> None:
+    mailbox = Mailbox()
+    for point in ((0.0, 0.0, 0.0), None, (1.0, 0.0, 0.0), None):
+        mailbox.put("hold", handle="board", point=point)
+    seen = [item.arguments["point"] for item in mailbox.take(0.0)]
+    assert seen == [(0.0, 0.0, 0.0), None, (1.0, 0.0, 0.0), None]
+
+
+def test_a_drag_merges_and_its_last_point_is_kept() -> None:
+    mailbox = Mailbox()
+    for x in (0.0, 1.0, 2.0):
+        mailbox.put("hold", handle="ball", point=(x, 0.0, 0.0))
+    mailbox.put("hold", handle="ball", point=None)
+    seen = [item.arguments["point"] for item in mailbox.take(0.0)]
+    assert seen == [(2.0, 0.0, 0.0), None]
+
+
+def test_only_the_colours_of_a_board_are_sent_again_and_only_while_they_change(
+    served: Served,
+) -> None:
+    def updates(end: str) -> list[dict[str, Any]]:
+        """What scene nodes are sent until the theme changes."""
+        session.command("view", view={"dark": end == "dark", "graphics": "low"})
+        found: list[dict[str, Any]] = []
+        for m in scene.messages():
+            if m["type"] == "ThemeConfigurationMessage" and m["dark_mode"] == (end == "dark"):
+                return found
+            if m["type"] == "SceneNodeUpdateMessage":
+                found.append(m)
+        raise AssertionError
+
+    with served.session("board") as session, SceneClient(session) as scene:
+        scene.wait_for_node("/board")
+        scene.skip(0.5)
+        waving = {m["name"]: m["updates"] for m in _later(scene, 120)}
+        assert set(waving["/board"]) == {"batched_colors"}
+        session.set(rate=0.0)
+        scene.skip(1.0)
+        assert updates("dark") == []
+
+
+def _later(scene: SceneClient, count: int) -> list[dict[str, Any]]:
+    found = (m for m, _ in zip(scene.messages(), range(count), strict=False))
+    return [m for m in found if m["type"] == "SceneNodeUpdateMessage"]
+
+
+# Surfaces -------------------------------------------------------------------------------------
+
+
+def hills(rows: int, columns: int) -> tuple[np.ndarray, np.ndarray]:
+    x, y = np.meshgrid(np.linspace(-1, 1, columns), np.linspace(-1, 1, rows))
+    points = np.stack([x, y, np.sin(3 * x) * y], axis=-1)
+    return points, np.asarray(np.random.default_rng(0).uniform(0, 1, points.shape))
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(2, 2), (3, 7), (300, 300)])
+def test_a_surface_is_sound_gltf_that_others_read(rows: int, columns: int) -> None:
+    points, colors = hills(rows, columns)
+    scene: Any = trimesh.load_scene(io.BytesIO(glb(points, colors, 1.0)), file_type="glb")
+    (mesh,) = scene.geometry.values()
+    np.testing.assert_allclose(mesh.vertices, points.reshape(-1, 3), atol=1e-6)
+    assert len(mesh.faces) == 2 * (rows - 1) * (columns - 1)
+    assert mesh.area > 4.0, "no less than the square it stands on"
+    projected = mesh.triangles[:, :, :2]
+    one, other = projected[:, 1] - projected[:, 0], projected[:, 2] - projected[:, 0]
+    turns = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
+    assert np.abs(turns).sum() / 2 == pytest.approx(4.0, rel=1e-5), "it is covered once"
+    assert len(set(np.sign(turns))) == 1, "all faces look the same way"
+
+
+def test_a_colour_is_sent_linear_and_darker_where_the_light_is_brighter() -> None:
+    """sRGB 0.5 is 0.2140 of full light."""
+    points, _ = hills(2, 2)
+    grey = np.full((2, 2, 3), 0.5)
+    for shine in (1.0, 2.0):
+        sent = np.frombuffer(glb(points, grey, shine)[-12 - 32 : -12], "<u2").reshape(4, 4)
+        np.testing.assert_allclose(sent[:, :3] / 65535, 0.2140 / shine, atol=1e-4)
+        assert (sent[:, 3] == 65535).all(), "opaque"
+
+
+def test_a_surface_is_replaced_only_once_the_new_one_is_there(
+    server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = 100.0
+    monkeypatch.setattr("server.boards.time.monotonic", lambda: now)
+    points, colors = hills(4, 5)
+    node = SurfaceNode(server, "wave", points, colors, LOW)
+    first, second = node._shown, node._hidden
+    assert (first.visible, second.visible) == (True, False)
+    now += 1.0
+    node.draw(points, colors)
+    assert node._shown is first, "nothing changed"
+    node.draw(points + 1.0, colors)
+    assert second.glb_data == glb(points + 1.0, colors, boards.shine(LOW))
+    assert (first.visible, second.visible) == (True, False)
+    now += 0.05
+    node.draw(points + 2.0, colors)
+    assert (first.visible, second.visible) == (True, False), "not yet prepared"
+    now += 0.1
+    node.draw(points + 2.0, colors)
+    assert (first.visible, second.visible) == (False, True)
+    now += 0.1
+    node.draw(points + 2.0, colors)
+    assert first.glb_data == glb(points + 2.0, colors, boards.shine(LOW))
+    assert (first.visible, second.visible) == (False, True)
+
+
+# Arrows ---------------------------------------------------------------------------------------
+
+
+def test_many_arrows_are_one_node_without_those_of_no_length(server: viser.ViserServer) -> None:
+    scene = ViserScene(server, Mailbox(), LOW)
+    starts = np.zeros((600, 3))
+    ends = np.tile([0.1, 0.0, 0.0], (600, 1))
+    ends[7] = 0.0
+    scene.arrows("policy", starts, ends)
+    node = scene._nodes["policy"]
+    assert node._handle.points.shape == (599, 2, 3)
+    assert 0.02 < node._handle.head_length < 0.05, "a head fits its arrow"
+    ends[1:] = 0.0
+    scene.arrows("policy", starts, ends)
+    assert scene._nodes["policy"] is node
+    assert node._handle.points.shape == (1, 2, 3)
+    scene._drawn.clear()
+    for none in (starts, np.empty((0, 3))):
+        scene.arrows("policy", none, none)
+    assert "policy" not in scene._drawn, "where there is no arrow nothing is shown"

@@ -54,6 +54,8 @@ def converged(mdp: FiniteMDP, change: float, tolerance: float) -> str:
     """A sentence once the last sweep changed no value by more than `tolerance`, else empty."""
     if not change <= tolerance:
         return ""
+    if change == 0.0:
+        return "The last sweep changed no value."
     if mdp.gamma == 1.0:
         return f"The last sweep changed no value by more than {tolerance:g}."
     far = error_bound(mdp.gamma, change)

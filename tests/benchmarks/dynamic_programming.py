@@ -48,5 +48,7 @@ def _mdp(side: int) -> tuple[FiniteMDP, float]:
 def _value_iteration(mdp: FiniteMDP) -> tuple[float, int]:
     """Seconds and sweeps."""
     begin = time.perf_counter()
-    *_, last = value_iteration.iterate(mdp, np.zeros(mdp.X), TOLERANCE)
-    return time.perf_counter() - begin, last.count
+    sweeps = 0
+    for sweep in value_iteration.iterate(mdp, np.zeros(mdp.X), TOLERANCE):
+        sweeps = sweep.count
+    return time.perf_counter() - begin, sweeps

@@ -113,11 +113,13 @@ def walk(problem: Problem, policy: np.ndarray, random: np.ndarray) -> Episode:
     return Episode(total, steps, True)
 
 
-def greedy_costs(problem: Problem, learners: Learners) -> np.ndarray:
-    """(S,) what one episode under each learner's greedy policy costs. The luck it meets is that
-    of the learner's next episode, which is not used up."""
-    walks = zip(learners.q.argmin(axis=2), learners.random.copy(), strict=True)
-    return np.array([walk(problem, policy, random).cost for policy, random in walks])
+def greedy_costs(problem: Problem, learners: Learners, trials: int = 1) -> np.ndarray:
+    """(S,) what an episode under each learner's greedy policy costs, the mean of some trials. The
+    luck they meet is that of the learner's next episodes, which is not used up."""
+    costs = np.zeros(len(learners.q))
+    for s, (q, random) in enumerate(zip(learners.q, learners.random.copy(), strict=True)):
+        costs[s] = np.mean([walk(problem, q.argmin(axis=1), random).cost for _ in range(trials)])
+    return costs
 
 
 def _check(problem: Problem, behavior: Behavior, rule: Rule, learners: Learners) -> None:

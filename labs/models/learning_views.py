@@ -43,7 +43,7 @@ def draw_grid(
     origin = board(world.shape)
     centers = cell_centers(origin, CELL, rows, columns)
     size = CELL * max(columns, 1.6 * rows)
-    scene.camera((0.0, -0.75 * size, 0.95 * size), (0.0, -0.04 * size, 0.0))
+    scene.camera((0.0, -0.5 * size, 0.6 * size), (0.0, -0.04 * size, 0.0))
     value = tables[shown].min(axis=1)
     dearest = task.q_star[task.judged].min(axis=1).max(initial=1.0)
     colors = sequential(task.laid(dearest - value), 0.0, dearest)
@@ -51,6 +51,10 @@ def draw_grid(
     for letter, color in (("#", WALL), ("C", CLIFF), ("G", GOAL)):
         colors[letters == letter] = color
     scene.cells("board", origin, CELL, colors)
+    for column, wind in enumerate(world.wind):
+        if wind:
+            below = centers[-1, column] - (0.0, 0.8 * CELL, 0.0)
+            scene.label(f"wind {column + 1}", "↑" * wind if wind < 4 else f"{wind}↑", below)
     at = centers[tuple(task.cells.T)] + (0.0, 0.0, 0.012)
     step = world.moves[tables[shown].argmin(axis=1)]
     ways = np.stack([step[:, 1], -step[:, 0], 0 * step[:, 0]], axis=1)
@@ -76,7 +80,7 @@ def draw_pendulum(
 ) -> None:
     """The pendulums, and the surface of min_u Q over angle and velocity with a ball where each
     of them is."""
-    scene.camera((2.3, -1.1, 1.5), (0.0, 0.1, 0.55))
+    scene.camera((1.75, -0.35, 1.35), (0.0, 0.0 - 0.25 * (len(names) - 1), 0.45))
     (x, y), (along, across), tall = SURFACE
     value = task.laid(tables[shown].min(axis=1))
     dearest = float(task.q_star.min(axis=1).max())
@@ -86,8 +90,10 @@ def draw_pendulum(
     )
     points = np.stack([x + along * v, y + across * q, 0.05 + height], axis=-1)
     scene.surface("cost to go", points, sequential(dearest - value, 0.0, dearest))
+    scene.label("angle", "angle ⟶", points[-1, 0] + (0.12, 0.2, 0.0))
+    scene.label("velocity", "velocity ⟶", points[0, -1] + (0.5, 0.12, 0.0))
     for m, name in enumerate(names):
-        place = (0.0, -0.65 - 0.9 * m)
+        place = (0.0, -0.6 - 0.8 * m)
         scene.arm(f"pendulum {m + 1}", hanging(1, place, RODS[m]), walk.at[m, :1])
         scene.label(f"name {m + 1}", name, (*place, 1.4))
         state = int(PENDULUM.state(walk.at[m, :1], walk.at[m, 1:]))

@@ -13,7 +13,7 @@ from labs.algorithms.experience import transition
 from labs.models.learning_tasks import PENDULUM, Task
 from labs.models.pendulum_mdp import advance
 
-PERIOD = 0.02
+PERIOD = 0.01
 """[s]"""
 MOVE = 0.2
 """[s]"""

@@ -23,6 +23,8 @@ from labs.models.learning_tasks import Task
 
 Training = Mapping[str, np.ndarray]
 CURVES = ("online", "offline", "off", "most")
+TRIALS = 20
+"""Of a greedy policy where luck has a say in what it costs."""
 KEPT = 1000
 """Batches whose curves are kept; older ones are dropped."""
 
@@ -60,10 +62,11 @@ def further(
         step(task.practice, behavior, rule, method, learners_of(training, m), episodes)
         for m, method in enumerate(methods)
     ]
+    trials = 1 if task.mdp.deterministic else TRIALS
     errors = np.array([[task.errors(q) for q in learners.q] for learners in after])
     points = {
         "online": np.array([learners.costs.mean(axis=1) for learners in after]),
-        "offline": np.array([greedy_costs(task.trial, learners) for learners in after]),
+        "offline": np.array([greedy_costs(task.trial, learners, trials) for learners in after]),
         "off": errors[..., 0],
         "most": errors[..., 1],
     }

@@ -14,7 +14,7 @@ from labs.models.learning_tasks import PENDULUM, Task
 from labs.models.learning_views import CELL, board, draw_grid, draw_pendulum
 from labs.models.learning_walks import PERIOD, Walk, set_out, walked
 from labs.models.td_params import BATCHES, METHODS, LearningParams
-from labs.models.td_study import Training, begin, fits, further, moved, trained
+from labs.models.td_study import CURVES, Training, begin, fits, further, moved, trained
 from labs.params import Value, choice, knob
 from labs.plots import Curves, HeatMap, Line, Readout, TimeSeries, Trace
 from labs.scene import Scene, cell_at
@@ -23,6 +23,8 @@ SEEDS = {"grid": 10, "pendulum": 5}
 """Learners of each method."""
 ORDER = ("first", "second")
 AXES = ("column, or angle from upright [rad]", "row from below, or velocity [rad/s]")
+WINDOW = 10
+"""Batches over which the cost of learning is averaged."""
 OPTIMAL = 1e-9
 """A greedy walk that costs this much more than the best at most is one of the best."""
 
@@ -99,7 +101,7 @@ class TdControl(Lab[TdParams, TdState]):
     period = PERIOD
     plots = (
         _curves("Cost of an episode while learning", "J", "online", "online_low", "online_high"),
-        _curves("Cost of the greedy policy", "J", "offline", "offline_low", "offline_high"),
+        _curves("Cost of the greedy policy, median", "J", "offline", "offline_low", "offline_high"),
         _curves("Distance to Q*", "mean (root of squares); dashed: largest", "off", "most"),
         HeatMap("Q of the learner shown", "x", "y", "q", *AXES, "Q"),
         HeatMap("Greedy policy", "x", "y", "policy", *AXES, "u"),
@@ -108,8 +110,8 @@ class TdControl(Lab[TdParams, TdState]):
         TimeSeries("Cost of the walk in the scene", "", (Line("paid", "J"),), select="method"),
         Readout("trained", "Episodes of each learner", "", whole=True),
         Readout("optimum", "Optimal cost", ""),
-        Readout("greedy_first", "Greedy policy, first", ""),
-        Readout("greedy_second", "Greedy policy, second", ""),
+        Readout("greedy_first", "Greedy, median, first", ""),
+        Readout("greedy_second", "Greedy, median, second", ""),
         Readout("best_first", "Optimal learners, first", "", whole=True),
         Readout("best_second", "Optimal learners, second", "", whole=True),
     )
@@ -142,7 +144,7 @@ class TdControl(Lab[TdParams, TdState]):
         return TdState(training=training, walk=walk)
 
     def step(self, params: TdParams, inputs: Inputs, state: TdState) -> TdState:
-        """20 ms of the walk under the greedy policies of the moment."""
+        """10 ms of the walk under the greedy policies of the moment."""
         if state.trouble:
             return state
         task = params.task
@@ -204,8 +206,9 @@ class TdControl(Lab[TdParams, TdState]):
             measured["optimum"] = best
         if training["offline"].shape[-1]:
             for name, costs in zip(ORDER, training["offline"][..., -1], strict=False):
-                measured[f"greedy_{name}"] = float(costs.mean())
-                measured[f"best_{name}"] = float((costs <= best + OPTIMAL).sum())
+                measured[f"greedy_{name}"] = float(np.median(costs))
+                if task.mdp.deterministic:
+                    measured[f"best_{name}"] = float((costs <= best + OPTIMAL).sum())
         return measured
 
     def fields(self, params: TdParams, state: TdState) -> Mapping[str, np.ndarray]:
@@ -257,7 +260,8 @@ def _present(params: TdParams, state: TdState) -> Training:
 
 
 def _progress(task: Task, training: Training) -> dict[str, np.ndarray]:
-    """The curves over episodes: the mean of all learners, and the least and the largest."""
+    """The curves over episodes: the mean of all learners between the least and the largest, and
+    of what their greedy policies cost the median between the quartiles."""
     episodes, none = training["episodes"], np.zeros(0)
     best = float(task.q_star[task.start].min())
     known = np.isfinite(best) and len(episodes)
@@ -268,13 +272,24 @@ def _progress(task: Task, training: Training) -> dict[str, np.ndarray]:
     for m, name in enumerate(ORDER):
         there = m < len(training["q"])
         found[f"episodes_{name}"] = episodes if there else none
-        for curve in ("online", "offline", "off", "most"):
-            points = training[curve][m] if there else np.zeros((1, 0))
-            found[f"{curve}_{name}"] = points.mean(axis=0)
-            if curve in ("online", "offline"):
-                found[f"{curve}_low_{name}"] = points.min(axis=0)
-                found[f"{curve}_high_{name}"] = points.max(axis=0)
+        curves = {c: training[c][m] if there else np.zeros((1, 0)) for c in CURVES}
+        curves["online"] = _smooth(curves["online"])
+        for curve, points in curves.items():
+            low, middle, high = points.min(axis=0), points.mean(axis=0), points.max(axis=0)
+            if curve == "offline":  # One learner who walks in circles hides all others in a mean.
+                low, middle, high = np.quantile(points, (0.25, 0.5, 0.75), axis=0)
+            found[f"{curve}_low_{name}"] = low
+            found[f"{curve}_{name}"] = middle
+            found[f"{curve}_high_{name}"] = high
     return found
+
+
+def _smooth(curves: np.ndarray) -> np.ndarray:
+    """Each point (..., k) the mean of itself and up to WINDOW - 1 before it."""
+    sums = np.cumsum(curves, axis=-1)
+    late = sums[..., WINDOW:] - sums[..., :-WINDOW]
+    counts = np.minimum(np.arange(curves.shape[-1]) + 1, WINDOW)
+    return np.asarray(np.concatenate([sums[..., :WINDOW], late], axis=-1) / counts)
 
 
 def _diverged(training: Training) -> str:

@@ -1,5 +1,8 @@
 """The colours of values: even steps for the eye, and finite whatever comes."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -56,6 +59,14 @@ def test_finite_values_give_finite_colours() -> None:
     assert np.isfinite(sequential([-1.7e308, 0.0, 1.7e308])).all()
     tiny = sequential([0.0, 5e-324])
     assert np.isfinite(tiny).all()
+
+
+def test_heat_maps_on_the_page_wear_the_same_colours() -> None:
+    script = Path(__file__).parents[2] / "static" / "js" / "plots" / "heatmap.js"
+    tones = re.findall(r'"#([0-9a-f]{6})"', script.read_text(encoding="utf-8"))
+    assert len(tones) == 9
+    colors = np.round(255 * sequential(np.linspace(0.0, 1.0, len(tones)))).astype(int)
+    assert tones == ["{:02x}{:02x}{:02x}".format(*color) for color in colors.tolist()]
 
 
 def test_the_colours_cannot_be_spoilt() -> None:

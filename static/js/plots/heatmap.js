@@ -6,6 +6,10 @@ import { colour } from "./palette.js";
 
 const EVERY = 250; // [ms] between redraws
 
+// The colours of values in the scene too (labs/colors.py), from the least to the largest.
+const SEQUENTIAL = ["#2b2459", "#363d7d", "#3d589e", "#3477a0", "#35949d", "#56ad8f", "#82c381", "#bcd67c", "#f2e873"]
+  .map((tone, place, { length }) => [place / (length - 1), tone]);
+
 let loading = null;
 
 function load(address) {
@@ -57,7 +61,7 @@ export class HeatMap {
     const size = 0.75 * parseFloat(getComputedStyle(document.documentElement).fontSize);
     const axis = (text) => ({ title: { text, standoff: 6 }, gridcolor: colour("grid"), zeroline: false, ticks: "" });
     const trace = {
-      type: "heatmap", ...this.data, colorscale: "Viridis",
+      type: "heatmap", ...this.data, colorscale: SEQUENTIAL,
       colorbar: { title: { text: zLabel }, thickness: 10, outlinewidth: 0 },
     };
     const layout = {

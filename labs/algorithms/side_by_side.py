@@ -112,14 +112,19 @@ def passes(
         yield at, seconds
 
 
-def progress(at: Standing, tolerance: float) -> float:
-    """The part done in [0, 1] of the one farthest behind, by the decades its error has come
-    down."""
-    parts = [1.0]
-    for first, now, done in zip(at.errors[0], at.errors[-1], at.done, strict=True):
-        if not done and first > tolerance:
-            parts.append(math.log(first / max(now, tolerance)) / math.log(first / tolerance))
-    return min(max(min(parts), 0.0), 1.0)
+def progress(at: Standing, tolerance: float) -> float | None:
+    """The part done in [0, 1] of the one farthest behind, by the decades its error has come down;
+    None while only policy iteration is left, of which nobody knows how many policies it will
+    look at."""
+    if at.over:
+        return 1.0
+    parts = []
+    for i, method in enumerate(METHODS):
+        first, now = at.errors[0, i], at.errors[-1, i]
+        if method != "policy" and not at.done[i] and first > tolerance:
+            part = math.log(first / max(now, tolerance)) / math.log(first / tolerance)
+            parts.append(min(max(part, 0.0), 1.0))
+    return min(parts, default=None)
 
 
 def _pass(

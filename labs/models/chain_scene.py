@@ -1,6 +1,7 @@
 """A Markov chain drawn into the scene."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -29,13 +30,21 @@ def draw_chain(
         color: Color = "muted" if process.passing[x] else "actual"
         scene.sphere(f"state {x + 1}", place + LOW, 0.045, color)
         scene.label(f"name {x + 1}", f"{x + 1} {name}", place + BELOW)
-    shown = P > 0.0
-    if beads:
-        shown[source, beads] = True
-    strip, of = ribbons(where, P, shown)
-    tones = np.where(of[:, None] == source, BLUE, GRAY)
-    scene.surface("transitions", strip, np.stack([tones, tones]))
+    scene.surface("transitions", *_strip(process, source, tuple(beads)))
     for y in beads:
         place = bead(where, source, y, P[source, y])
         scene.handle(f"bead {y + 1}", place + LOW, 0.05)
         scene.label(f"chance {y + 1}", f"{P[source, y]:.2g}", place + ABOVE)
+
+
+@lru_cache(16)
+def _strip(
+    process: RewardProcess, source: int, beads: tuple[int, ...]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points and colours (2, columns, 3) of all ribbons; the same in most frames."""
+    shown = process.P > 0.0
+    if beads:
+        shown[source, beads] = True
+    strip, of = ribbons(process.where, process.P, shown)
+    tones = np.where(of[:, None] == source, BLUE, GRAY)
+    return strip, np.stack([tones, tones])

@@ -9,15 +9,14 @@ TIE = 1e-9
 """Costs that differ by less are equal."""
 
 
-def sentences(process: RewardProcess, gamma: float, source: int, target: int) -> str:
-    """All there is to say, a paragraph a line."""
-    said = [
-        *structure(process),
-        value(process, gamma),
-        controls(process, gamma),
-        edits(process, source, target),
-    ]
-    return "\n".join(filter(None, said))
+def about_chain(process: RewardProcess, source: int, target: int) -> str:
+    """The structure of P, and whether it can be edited; a paragraph a line."""
+    return "\n".join(filter(None, [*structure(process), edits(process, source, target)]))
+
+
+def about_value(process: RewardProcess, gamma: float) -> str:
+    """What the discount does to V, and the controls; a paragraph a line."""
+    return "\n".join(filter(None, [value(process, gamma), controls(process, gamma)]))
 
 
 def structure(process: RewardProcess) -> list[str]:
@@ -118,7 +117,9 @@ def _one_end(names: tuple[str, ...], modes: np.ndarray, end: Class) -> str:
         return _round_trip(names, end)
     magnitudes = np.abs(modes)
     second = float(magnitudes[1]) if len(magnitudes) > 1 else 0.0
-    if second < 1e-6:
+    if len(magnitudes) == 1:
+        speed = "and there is no other"
+    elif second < 1e-6:
         speed = "all others are 0: the start is soon forgotten altogether"
     elif second > 0.999:
         speed = f"the next has magnitude {second:.4f}: the start is forgotten very slowly"

@@ -59,6 +59,8 @@ TITLES: Mapping[str, str] = {
 }
 RANDOM = 6
 """States of a random chain."""
+HEAVIEST = 1e6
+"""Weight in an edited row."""
 ROW_GRAIN = 4
 """Decimals of an edited row."""
 
@@ -94,8 +96,8 @@ def parse_rows(text: str) -> dict[int, np.ndarray]:
             x, weights = int(number) - 1, np.array([float(entry) for entry in entries.split()])
         except ValueError:
             x, weights = -1, np.zeros(0)
-        sound = np.isfinite(weights).all() and (weights >= 0.0).all() and weights.sum() > 0.0
-        if not (colon and x >= 0 and sound and np.isfinite(weights.sum())):
+        sound = weights.any() and ((weights >= 0.0) & (weights <= HEAVIEST)).all()
+        if not (colon and x >= 0 and sound):
             raise LabError(
                 f"{line.strip()!r}: a changed row is the number of a state, a colon and a weight "
                 "from 0 for each state, as in 2: 0 0.5 0.5"

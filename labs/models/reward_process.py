@@ -52,7 +52,7 @@ class RewardProcess:
         """Whether these states exist, in a chain without controls: it can be edited there."""
         return len(self.table.controls) == 1 and max(states) < len(self.P)
 
-    @property
+    @cached_property
     def passing(self) -> np.ndarray:
         """(X,) bool: the states that are left for good sooner or later."""
         stays = np.concatenate([c.states for c in self.classes if c.closed])

@@ -15,7 +15,7 @@ from labs.errors import LabError
 from labs.lab import Inputs, Lab, Measurement, Snapshot, State
 from labs.models.chain_graph import REST, on_the_way
 from labs.models.chain_scene import draw_chain
-from labs.models.chain_words import sentences
+from labs.models.chain_words import about_chain, about_value
 from labs.models.chains import TITLES, parse_rows, table_of, write_rows
 from labs.models.reward_process import Edit, RewardProcess, reward_process
 from labs.models.tables import parse
@@ -158,14 +158,16 @@ class MarkovParams(Params):
 
     @property
     def process(self) -> RewardProcess:
-        return _process(self)
+        edit = (self.rows, *self.places, self.shift)
+        return _process(self.chain, round(self.number), self.table, self.first, *edit)
 
 
 @lru_cache(64)
-def _process(params: MarkovParams) -> RewardProcess:
-    table = table_of(params.chain, round(params.number), params.table)
-    edit = Edit(parse_rows(params.rows), *params.places, params.shift)
-    return reward_process(table, params.first, edit)
+def _process(
+    name: str, number: int, own: str, first: float, rows: str, source: int, target: int, s: float
+) -> RewardProcess:
+    edit = Edit(parse_rows(rows), source, target, s)
+    return reward_process(table_of(name, number, own), first, edit)
 
 
 @dataclass(kw_only=True)
@@ -193,7 +195,7 @@ class Markov(Lab[MarkovParams, MarkovState]):
     Params = MarkovParams
     period = 0.02
     plots = (
-        Note("In words", "words"),
+        Note("The chain in words", "chain"),
         Bars("Distribution now, and in the long run", "mu", r"\mu_k", "", marks="far"),
         TimeSeries(
             "Probability of each state",
@@ -209,6 +211,7 @@ class Markov(Lab[MarkovParams, MarkovState]):
         ),
         Curve("Eigenvalues of P", "re", "im", "Re λ", "Im λ", points=True, guide="unit-circle"),
         Matrix("Transition matrix", "P", "P", shade=True),
+        Note("The value in words", "value"),
         Bars("Cost-to-go by iteration, and exact", "V", r"V_k", "", marks="exact"),
         Curves(
             "Error of the iteration",
@@ -262,11 +265,9 @@ class Markov(Lab[MarkovParams, MarkovState]):
         return replace(state, t=state.t + self.period, walk=walk)
 
     def solve(self, params: MarkovParams, state: MarkovState) -> Iterator[Snapshot]:
-        """From the V of the state; or from 0 where gamma = 1, since then what is put into a state
-        that is never left stays there."""
+        """Always from V_0 = 0, so that the errors tell the whole way."""
         process, gamma = params.process, params.gamma
-        exact = process.cost_to_go(gamma)
-        V0 = state.V if gamma < 1.0 else np.zeros(len(process.C))
+        exact, V0 = process.cost_to_go(gamma), np.zeros(len(process.C))
         most = SWEEPS if exact.finite.all() else UNENDING
         for k, found in enumerate(evaluate(process.P, process.C, gamma, V0, exact, most), 1):
             data = {"V": found.V, "errors": found.errors, "bounds": found.bounds}
@@ -299,10 +300,9 @@ class Markov(Lab[MarkovParams, MarkovState]):
             "steps": float(walk.steps),
             "off": 50.0 * float(np.abs(walk.mu - far).sum()),
             "visits_off": 50.0 * float(np.abs(visited - far).sum()),
+            "second": float(np.abs(np.append(process.eigenvalues, 0.0)[1])),
             "step_cost": float(far @ process.C),
         }
-        if len(process.P) > 1:
-            measured["second"] = float(np.abs(process.eigenvalues[1]))
         if x < len(process.P) and found.finite[x]:
             measured["value"] = float(found.V[x])
         return measured
@@ -332,13 +332,16 @@ class Markov(Lab[MarkovParams, MarkovState]):
         }
 
     def notes(self, params: MarkovParams, state: MarkovState) -> Mapping[str, str]:
-        return {"words": sentences(params.process, params.gamma, *params.places)}
+        process = params.process
+        return {
+            "chain": about_chain(process, *params.places),
+            "value": about_value(process, params.gamma),
+        }
 
     def draw(self, scene: Scene, params: MarkovParams, state: MarkovState) -> None:
         process, walk, (source, target) = params.process, state.walk, params.places
         flow = walk.mu + walk.phase * (walk.ahead - walk.mu)
-        beads = process.beads(source, target)
-        draw_chain(scene, process, flow, source, beads)
+        draw_chain(scene, process, flow, source, process.beads(source, target))
         token = process.where[walk.at] + REST
         if walk.phase > WAIT and params.pace < HURRY:
             part = (walk.phase - WAIT) / (1.0 - WAIT)

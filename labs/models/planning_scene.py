@@ -61,7 +61,7 @@ def draw_grid(
     _policy_arrows(scene, "policy", picture, world, centers, size)
     if min(world.shape) >= 2:
         relief = centers + np.array([0.0, size * rows + 0.2, 0.0])
-        relief[..., 2] += world.on_map(_heights(picture), HEIGHT)
+        relief[..., 2] += _laid(picture, world)
         scene.surface("relief", relief, _cell_colors(picture, world, goals=False))
         _policy_arrows(scene, "policy on the relief", picture, world, relief, size)
         scene.label("values", "cost-to-go V", relief[0, columns // 2] + [0.0, 0.15, 0.3])
@@ -106,19 +106,19 @@ def draw_pendulum(scene: Scene, picture: Picture, grid: PendulumGrid, walk: Walk
             scene.arc(
                 "torque", (0.06, PIVOT[1], 0.75), (1.0, 0.0, 0.0), np.pi * 0.9 * tau / 6.0, 0.2
             )
+    corner, fast = 1e-6, grid.v_max
     for name, text, q, v in (
-        ("hanging", "hanging", 0.0, 0.0),
-        ("upright", "upright", np.pi, 0.0),
-        ("fastest", f"v = {grid.v_max:g} rad/s", np.pi, grid.v_max),
-        ("fastest back", f"v = -{grid.v_max:g} rad/s", np.pi, -grid.v_max),
+        ("front", f"hanging, v = -{fast:g} rad/s", corner, -fast),
+        ("back", f"v = {fast:g} rad/s", corner, fast),
+        ("middle", "upright", np.pi, -fast),
     ):
-        above = np.array([0.0, 0.0, 0.16]) + _on_relief(grid, heights, np.array([[q, v]]))[0]
+        above = np.array([0.0, 0.0, 0.08]) + _on_relief(grid, heights, np.array([[q, v]]))[0]
         scene.label(name, text, above)
 
 
 def _cell_colors(picture: Picture, world: GridWorld, *, goals: bool) -> np.ndarray:
     """(rows, columns, 3): by value; walls grey, the cliff red and, if `goals`, those green."""
-    colors = sequential(world.on_map(_heights(picture)), 0.0, HEIGHT)
+    colors = sequential(_laid(picture, world), 0.0, HEIGHT)
     signs = np.array([list(row) for row in world.rows])
     for sign, color in {"#": WALL, "C": CLIFF, **({"G": GOAL} if goals else {})}.items():
         colors[signs == sign] = color
@@ -128,6 +128,12 @@ def _cell_colors(picture: Picture, world: GridWorld, *, goals: bool) -> np.ndarr
 def _heights(picture: Picture) -> np.ndarray:
     """(X,) [m]: in proportion to the values."""
     return np.asarray(np.clip(picture.V / picture.top, -0.2, 1.3) * HEIGHT)
+
+
+def _laid(picture: Picture, world: GridWorld) -> np.ndarray:
+    """(rows, columns) [m]: of the relief; walls stand out, and a cliff is a hole."""
+    walls = np.array([[sign == "#" for sign in row] for row in world.rows])
+    return np.where(walls, HEIGHT, world.on_map(_heights(picture)))
 
 
 def _policy_arrows(

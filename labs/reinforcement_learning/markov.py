@@ -47,7 +47,7 @@ class MarkovParams(Params):
     number: float = knob(
         1.0,
         1.0,
-        50.0,
+        41.0,
         symbol="n",
         unit="",
         label="Which random chain",

@@ -56,16 +56,6 @@ class Rule(NamedTuple):
     """An estimate beyond this magnitude diverges: the episode is broken off."""
 
 
-class Episode(NamedTuple):
-    """What came of one."""
-
-    cost: float
-    """Discounted: sum of gamma^k l_k."""
-    steps: int
-    sound: bool
-    """False where an estimate diverged."""
-
-
 def problem(mdp: FiniteMDP, starts: Sequence[int], horizon: int) -> Problem:
     """The episodes of an MDP that start in one of `starts`."""
     certain = mdp.deterministic
@@ -92,10 +82,29 @@ def transition(problem: Problem, x: int, u: int, state: np.ndarray) -> int:
     """The next state."""
     if problem.successor.size:
         return int(problem.successor[x, u])
+    return _drawn(problem, x, u, state)
+
+
+@compiled
+def _drawn(problem: Problem, x: int, u: int, state: np.ndarray) -> int:
     return int(np.searchsorted(problem.cumulative[u, x], uniform(state), "right"))
+
+
+@compiled
+def least(q: np.ndarray, x: int) -> float:
+    """min_u Q(x, u)."""
+    cost = q[x, 0]
+    for u in range(1, q.shape[1]):
+        cost = min(cost, q[x, u])
+    return float(cost)
 
 
 @compiled
 def step_size(rule: Rule, n: int) -> float:
     """alpha_n of a pair's n-th update."""
-    return rule.alpha if rule.omega == 0.0 else rule.alpha * float(n) ** -rule.omega
+    return rule.alpha if rule.omega == 0.0 else _shrunk(rule, n)
+
+
+@compiled
+def _shrunk(rule: Rule, n: int) -> float:
+    return rule.alpha * float(n) ** -rule.omega

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labs.algorithms.compiled import compiled
+from labs.algorithms.compiled import compiled, copied
 from labs.algorithms.random_numbers import below, uniform
 
 EPSILON_GREEDY, BOLTZMANN, CONFIDENCE, FOLLOW = range(4)
@@ -41,30 +41,33 @@ class Behavior(NamedTuple):
     """(X,) int64: mu, for FOLLOW; empty otherwise."""
 
 
+@copied
+def choose(behavior: Behavior, x: int, q: np.ndarray, visits: np.ndarray, state: np.ndarray) -> int:
+    """The control to try in state x, from Q and N, both (X, U)."""
+    if behavior.kind != EPSILON_GREEDY or behavior.decay > 0.0:
+        return _otherwise(behavior, x, q, visits, state)
+    if uniform(state) < behavior.epsilon:
+        return below(state, q.shape[1])
+    return greedy(q, x, state)
+
+
 @compiled
-def greedy(costs: np.ndarray, state: np.ndarray) -> int:
-    """The control of least cost; among equals, any."""
-    best, ties = 0, 1
-    for u in range(1, len(costs)):
-        if costs[u] < costs[best]:
-            best, ties = u, 1
-        elif costs[u] == costs[best]:
+def greedy(q: np.ndarray, x: int, state: np.ndarray) -> int:
+    """The control of least Q(x, u); among equals, any."""
+    least, best, ties = q[x, 0], 0, 1
+    for u in range(1, q.shape[1]):
+        cost = q[x, u]
+        if cost < least:
+            least, best, ties = cost, u, 1
+        elif cost == least:
             ties += 1
-    if ties == 1:
-        return best
-    skip = below(state, ties)
-    for u in range(best, len(costs)):
-        if costs[u] == costs[best]:
-            if skip == 0:
-                return u
-            skip -= 1
-    return best
+    return best if ties == 1 else _among_equals(q, x, best, ties, state)
 
 
 @compiled
 def boltzmann(costs: np.ndarray, beta: float, state: np.ndarray) -> int:
-    """A control with probability proportional to exp(-beta cost). Costs count from the least one,
-    so that nothing overflows."""
+    """A control with probability proportional to exp(-beta cost). Costs (U,) count from the least
+    one, so that nothing overflows."""
     least, total = costs.min(), 0.0
     for cost in costs:
         total += np.exp(-beta * (cost - least))
@@ -78,27 +81,39 @@ def boltzmann(costs: np.ndarray, beta: float, state: np.ndarray) -> int:
 
 @compiled
 def confidence(costs: np.ndarray, visits: np.ndarray, bound: float, state: np.ndarray) -> int:
-    """The control of the lowest confidence bound; an untried one comes before all others."""
-    scores = np.empty(len(costs))
+    """The control of the lowest confidence bound; an untried one comes before all others. Costs
+    and visits are (U,)."""
+    scores = np.empty((1, len(costs)))
     logarithm = 2.0 * np.log(1.0 + visits.sum())
     for u in range(len(costs)):
         if visits[u] == 0:
-            scores[u] = -np.inf
+            scores[0, u] = -np.inf
         else:
-            scores[u] = costs[u] - bound * np.sqrt(logarithm / visits[u])
-    return greedy(scores, state)
+            scores[0, u] = costs[u] - bound * np.sqrt(logarithm / visits[u])
+    return greedy(scores, 0, state)
 
 
 @compiled
-def choose(
-    behavior: Behavior, x: int, costs: np.ndarray, visits: np.ndarray, state: np.ndarray
+def _otherwise(
+    behavior: Behavior, x: int, q: np.ndarray, visits: np.ndarray, state: np.ndarray
 ) -> int:
-    """The control to try in state x; `costs` (U,) and `visits` (U,) are its rows of Q and N."""
+    """Whatever is not epsilon-greedy with a constant epsilon."""
     if behavior.kind == CONFIDENCE:
-        return confidence(costs, visits, behavior.bound, state)
-    n = 1.0 + visits.sum() if behavior.decay > 0.0 else 1.0
+        return confidence(q[x], visits[x], behavior.bound, state)
+    n = 1.0 + visits[x].sum() if behavior.decay > 0.0 else 1.0
     if behavior.kind == BOLTZMANN:
-        return boltzmann(costs, behavior.beta * (1.0 + np.log(n)), state)
+        return boltzmann(q[x], behavior.beta * (1.0 + np.log(n)), state)
     if uniform(state) < behavior.epsilon * n**-behavior.decay:
-        return below(state, len(costs))
-    return int(behavior.policy[x]) if behavior.kind == FOLLOW else greedy(costs, state)
+        return below(state, q.shape[1])
+    return int(behavior.policy[x]) if behavior.kind == FOLLOW else greedy(q, x, state)
+
+
+@compiled
+def _among_equals(q: np.ndarray, x: int, best: int, ties: int, state: np.ndarray) -> int:
+    skip = below(state, ties)
+    for u in range(best, q.shape[1]):
+        if q[x, u] == q[x, best]:
+            if skip == 0:
+                return u
+            skip -= 1
+    return best

@@ -13,7 +13,7 @@ an episode is cut short, the value of the pair it was cut at stands for the rest
 import numpy as np
 
 from labs.algorithms.compiled import compiled
-from labs.algorithms.experience import Episode, Problem, Rule, begin, step_size, transition
+from labs.algorithms.experience import Problem, Rule, begin, step_size, transition
 from labs.algorithms.exploration import Behavior, choose
 
 
@@ -25,25 +25,30 @@ def sarsa(
     q: np.ndarray,
     visits: np.ndarray,
     state: np.ndarray,
-) -> Episode:
-    """One episode. `q` (X, U), `visits` (X, U) and the random `state` change in place."""
-    x, steps, total, discount = begin(problem, state), 0, 0.0, 1.0
-    u = choose(behavior, x, q[x], visits[x], state)
-    while steps < problem.horizon and not problem.terminal[x]:
-        following = transition(problem, x, u, state)
-        target, next_u = problem.cost[x, u], 0
-        if not problem.terminal[following]:
-            next_u = choose(behavior, following, q[following], visits[following], state)
-            target += problem.gamma * q[following, next_u]
-        visits[x, u] += 1
-        q[x, u] += step_size(rule, visits[x, u]) * (target - q[x, u])
-        total += discount * problem.cost[x, u]
-        discount *= problem.gamma
-        steps += 1
-        if not abs(q[x, u]) <= rule.limit:
-            return Episode(total, steps, False)
-        x, u = following, next_u
-    return Episode(total, steps, True)
+    costs: np.ndarray,
+    lengths: np.ndarray,
+) -> bool:
+    """Episodes of one learner, as many as fit into `costs` and `lengths` (k,), which they fill.
+    `q` (X, U), `visits` (X, U) and the random `state` change in place. False where an estimate
+    left the rule's limit, and with it the last episode begun."""
+    for k in range(len(costs)):
+        x, discount = begin(problem, state), 1.0
+        u = choose(behavior, x, q, visits, state)
+        while lengths[k] < problem.horizon and not problem.terminal[x]:
+            following = transition(problem, x, u, state)
+            target, next_u = problem.cost[x, u], 0
+            if not problem.terminal[following]:
+                next_u = choose(behavior, following, q, visits, state)
+                target += problem.gamma * q[following, next_u]
+            visits[x, u] += 1
+            q[x, u] += step_size(rule, visits[x, u]) * (target - q[x, u])
+            costs[k] += discount * problem.cost[x, u]
+            lengths[k] += 1
+            discount *= problem.gamma
+            if not abs(q[x, u]) <= rule.limit:
+                return False
+            x, u = following, next_u
+    return True
 
 
 @compiled
@@ -54,39 +59,41 @@ def sarsa_n(
     q: np.ndarray,
     visits: np.ndarray,
     state: np.ndarray,
-) -> Episode:
-    """One episode. `q` (X, U), `visits` (X, U) and the random `state` change in place."""
+    costs: np.ndarray,
+    lengths: np.ndarray,
+) -> bool:
+    """The same by SARSA(n)."""
     n, gamma = rule.n, problem.gamma
     # The last n + 1 pairs and n costs, in rings.
     xs, us = np.zeros(n + 1, np.int64), np.zeros(n + 1, np.int64)
-    costs = np.zeros(n)
-    x, t, total, discount = begin(problem, state), 0, 0.0, 1.0
-    u = choose(behavior, x, q[x], visits[x], state)
-    xs[0], us[0] = x, u
-    end = 0 if problem.terminal[x] else problem.horizon
-    updated = 0
-    while updated < end:
-        if t < end:
-            costs[t % n] = problem.cost[x, u]
-            total += discount * problem.cost[x, u]
-            discount *= gamma
-            following, next_u = transition(problem, x, u, state), 0
-            if problem.terminal[following]:
-                end = t + 1
-            else:
-                next_u = choose(behavior, following, q[following], visits[following], state)
-            visits[x, u] += 1
-            x, u = following, next_u
-            t += 1
-            xs[t % (n + 1)], us[t % (n + 1)] = x, u
-        if t - updated == n or t == end:
-            target = 0.0 if problem.terminal[x] else q[x, u]
-            for k in range(t - 1, updated - 1, -1):
-                target = costs[k % n] + gamma * target
-            old_x, old_u = xs[updated % (n + 1)], us[updated % (n + 1)]
-            alpha = step_size(rule, visits[old_x, old_u])
-            q[old_x, old_u] += alpha * (target - q[old_x, old_u])
-            updated += 1
-            if not abs(q[old_x, old_u]) <= rule.limit:
-                return Episode(total, t, False)
-    return Episode(total, t, True)
+    paid = np.zeros(n)
+    for k in range(len(costs)):
+        x, t, updated, discount = begin(problem, state), 0, 0, 1.0
+        u = choose(behavior, x, q, visits, state)
+        xs[0], us[0] = x, u
+        end = 0 if problem.terminal[x] else problem.horizon
+        while updated < end:
+            if t < end:
+                paid[t % n] = problem.cost[x, u]
+                costs[k] += discount * problem.cost[x, u]
+                discount *= gamma
+                following, next_u = transition(problem, x, u, state), 0
+                if problem.terminal[following]:
+                    end = t + 1
+                else:
+                    next_u = choose(behavior, following, q, visits, state)
+                visits[x, u] += 1
+                x, u, t = following, next_u, t + 1
+                xs[t % (n + 1)], us[t % (n + 1)] = x, u
+            if t - updated == n or t == end:
+                target = 0.0 if problem.terminal[x] else q[x, u]
+                for i in range(t - 1, updated - 1, -1):
+                    target = paid[i % n] + gamma * target
+                then_x, then_u = xs[updated % (n + 1)], us[updated % (n + 1)]
+                alpha = step_size(rule, visits[then_x, then_u])
+                q[then_x, then_u] += alpha * (target - q[then_x, then_u])
+                updated += 1
+                if not abs(q[then_x, then_u]) <= rule.limit:
+                    return False
+        lengths[k] = t
+    return True

@@ -13,7 +13,7 @@ then the estimates diverge. Replacing traces never exceed 1."""
 import numpy as np
 
 from labs.algorithms.compiled import compiled
-from labs.algorithms.experience import Episode, Problem, Rule, begin, step_size, transition
+from labs.algorithms.experience import Problem, Rule, begin, step_size, transition
 from labs.algorithms.exploration import Behavior, choose
 
 FAINT = 1e-12
@@ -28,45 +28,53 @@ def sarsa_lambda(
     q: np.ndarray,
     visits: np.ndarray,
     state: np.ndarray,
-) -> Episode:
-    """One episode. `q` (X, U), `visits` (X, U) and the random `state` change in place."""
+    costs: np.ndarray,
+    lengths: np.ndarray,
+) -> bool:
+    """Episodes of one learner, as many as fit into `costs` and `lengths` (k,), which they fill.
+    `q` (X, U), `visits` (X, U) and the random `state` change in place. False where an estimate
+    left the rule's limit, and with it the last episode begun."""
     controls, fading = q.shape[1], problem.gamma * rule.decay
-    trace = np.zeros(q.size)
-    traced = np.empty(q.size, np.int64)
-    many = 0  # The pairs with a trace are traced[:many], each as x U + u.
-    learner = q.copy() if rule.offline else q
-    x, steps, total, discount, sound = begin(problem, state), 0, 0.0, 1.0, True
-    u = choose(behavior, x, q[x], visits[x], state)
-    while sound and steps < problem.horizon and not problem.terminal[x]:
-        following = transition(problem, x, u, state)
-        target, next_u = problem.cost[x, u], 0
-        if not problem.terminal[following]:
-            next_u = choose(behavior, following, q[following], visits[following], state)
-            target += problem.gamma * q[following, next_u]
-        delta = target - q[x, u]
-        visits[x, u] += 1
-        pair = x * controls + u
-        if trace[pair] == 0.0:
-            traced[many] = pair
-            many += 1
-        trace[pair] = 1.0 if rule.replacing else trace[pair] + 1.0
-        i = 0
-        while i < many:
-            z = traced[i]
-            zx, zu = z // controls, z % controls
-            weight = step_size(rule, visits[zx, zu]) * trace[z]
-            learner[zx, zu] += weight * delta
-            sound = sound and abs(learner[zx, zu]) <= rule.limit
-            trace[z] *= fading
-            if trace[z] < FAINT:
-                trace[z] = 0.0
-                many -= 1
-                traced[i] = traced[many]
-            else:
-                i += 1
-        total += discount * problem.cost[x, u]
-        discount *= problem.gamma
-        steps += 1
-        x, u = following, next_u
-    q[:] = learner
-    return Episode(total, steps, sound)
+    trace, traced = np.zeros(q.size), np.empty(q.size, np.int64)
+    sound = True
+    for k in range(len(costs)):
+        many = 0  # The pairs with a trace are traced[:many], each as x U + u.
+        learned = q.copy() if rule.offline else q
+        x, discount = begin(problem, state), 1.0
+        u = choose(behavior, x, q, visits, state)
+        while sound and lengths[k] < problem.horizon and not problem.terminal[x]:
+            following = transition(problem, x, u, state)
+            target, next_u = problem.cost[x, u], 0
+            if not problem.terminal[following]:
+                next_u = choose(behavior, following, q, visits, state)
+                target += problem.gamma * q[following, next_u]
+            delta = target - q[x, u]
+            visits[x, u] += 1
+            pair = x * controls + u
+            if trace[pair] == 0.0:
+                traced[many] = pair
+                many += 1
+            trace[pair] = 1.0 if rule.replacing else trace[pair] + 1.0
+            i = 0
+            while i < many:
+                z = traced[i]
+                zx, zu = z // controls, z % controls
+                weight = step_size(rule, visits[zx, zu]) * trace[z]
+                learned[zx, zu] += weight * delta
+                sound = sound and abs(learned[zx, zu]) <= rule.limit
+                trace[z] *= fading
+                if trace[z] < FAINT:
+                    trace[z] = 0.0
+                    many -= 1
+                    traced[i] = traced[many]
+                else:
+                    i += 1
+            costs[k] += discount * problem.cost[x, u]
+            lengths[k] += 1
+            discount *= problem.gamma
+            x, u = following, next_u
+        q[:] = learned
+        trace[traced[:many]] = 0.0
+        if not sound:
+            return False
+    return True

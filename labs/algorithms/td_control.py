@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labs.algorithms.compiled import compiled
-from labs.algorithms.experience import Episode, Problem, Rule, begin, transition
+from labs.algorithms.experience import Problem, Rule, begin, transition
 from labs.algorithms.exploration import FOLLOW, Behavior
 from labs.algorithms.q_learning import q_learning
 from labs.algorithms.random_numbers import seeded
@@ -19,6 +19,7 @@ from labs.algorithms.sarsa_lambda import sarsa_lambda
 from labs.errors import LabError
 
 Q_LEARNING, SARSA, SARSA_N, SARSA_LAMBDA = range(4)
+METHODS = (q_learning, sarsa, sarsa_n, sarsa_lambda)
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,44 +66,19 @@ def step(
     q, visits, random = learners.q.copy(), learners.visits.copy(), learners.random.copy()
     costs = np.zeros((len(q), episodes))
     lengths = np.zeros((len(q), episodes), np.int64)
-    sound = _learn(problem, behavior, rule, method, q, visits, random, costs, lengths)
+    learn = METHODS[method]
+    sound = all(
+        learn(problem, behavior, rule, q[s], visits[s], random[s], costs[s], lengths[s])
+        for s in range(len(q))
+    )
     return replace(
         learners, q=q, visits=visits, random=random, costs=costs, lengths=lengths, sound=sound
     )
 
 
 @compiled
-def _learn(
-    problem: Problem,
-    behavior: Behavior,
-    rule: Rule,
-    method: int,
-    q: np.ndarray,
-    visits: np.ndarray,
-    random: np.ndarray,
-    costs: np.ndarray,
-    lengths: np.ndarray,
-) -> bool:
-    """Fills `costs` and `lengths`; False as soon as a learner's estimates diverge."""
-    for s in range(len(q)):
-        for k in range(costs.shape[1]):
-            if method == Q_LEARNING:
-                episode = q_learning(problem, behavior, rule, q[s], visits[s], random[s])
-            elif method == SARSA:
-                episode = sarsa(problem, behavior, rule, q[s], visits[s], random[s])
-            elif method == SARSA_N:
-                episode = sarsa_n(problem, behavior, rule, q[s], visits[s], random[s])
-            else:
-                episode = sarsa_lambda(problem, behavior, rule, q[s], visits[s], random[s])
-            costs[s, k], lengths[s, k] = episode.cost, episode.steps
-            if not episode.sound:
-                return False
-    return True
-
-
-@compiled
-def walk(problem: Problem, policy: np.ndarray, random: np.ndarray) -> Episode:
-    """One episode under `policy` (X,) int64, with nothing learned. `random` changes in place."""
+def walk(problem: Problem, policy: np.ndarray, random: np.ndarray) -> float:
+    """Discounted cost of an episode under `policy` (X,) int64. `random` changes in place."""
     x, steps, total, discount = begin(problem, random), 0, 0.0, 1.0
     while steps < problem.horizon and not problem.terminal[x]:
         u = policy[x]
@@ -110,7 +86,7 @@ def walk(problem: Problem, policy: np.ndarray, random: np.ndarray) -> Episode:
         discount *= problem.gamma
         steps += 1
         x = transition(problem, x, u, random)
-    return Episode(total, steps, True)
+    return total
 
 
 def greedy_costs(problem: Problem, learners: Learners, trials: int = 1) -> np.ndarray:
@@ -118,7 +94,7 @@ def greedy_costs(problem: Problem, learners: Learners, trials: int = 1) -> np.nd
     luck they meet is that of the learner's next episodes, which is not used up."""
     costs = np.zeros(len(learners.q))
     for s, (q, random) in enumerate(zip(learners.q, learners.random.copy(), strict=True)):
-        costs[s] = np.mean([walk(problem, q.argmin(axis=1), random).cost for _ in range(trials)])
+        costs[s] = np.mean([walk(problem, q.argmin(axis=1), random) for _ in range(trials)])
     return costs
 
 

@@ -5,10 +5,11 @@ Figures of one run stand side by side; compare ratios, not seconds, across machi
 import argparse
 import platform
 
-from tests.benchmarks import dynamic_programming, headless, latency, load
+from tests.benchmarks import dynamic_programming, headless, latency, load, td_control
 
 MEASURES = {
     "headless": headless.ratio_to_bare_calls,
+    "q-learning": td_control.q_learning_steps,
     "slider": latency.slider_to_telemetry,
     "scene": latency.slider_to_scene,
     "page": latency.page_to_motion,

@@ -13,14 +13,14 @@ NEVER = np.zeros(4, np.int32)
 
 def frequencies(behavior: Behavior, costs: np.ndarray, visits: np.ndarray = NEVER) -> np.ndarray:
     state = seeded(np.random.default_rng(0), 1)[0]
-    drawn = [choose(behavior, 0, costs, visits, state) for _ in range(DRAWS)]
+    drawn = [choose(behavior, 0, costs[None], visits[None], state) for _ in range(DRAWS)]
     return np.bincount(drawn, minlength=len(costs)) / DRAWS
 
 
 def test_greedy_breaks_ties_at_random() -> None:
     state = seeded(np.random.default_rng(0), 1)[0]
-    costs = np.array([2.0, 1.0, 1.0, 3.0, 1.0])
-    counts = np.bincount([greedy(costs, state) for _ in range(DRAWS)], minlength=5)
+    costs = np.array([[2.0, 1.0, 1.0, 3.0, 1.0]])
+    counts = np.bincount([greedy(costs, 0, state) for _ in range(DRAWS)], minlength=5)
     np.testing.assert_allclose(counts / DRAWS, [0, 1 / 3, 1 / 3, 0, 1 / 3], atol=0.012)
 
 
@@ -47,9 +47,10 @@ def test_confidence_takes_the_lowest_bound() -> None:
     for bound in (0.0, 0.3, 1.0, 3.0, 30.0):
         lowest = COSTS - bound * np.sqrt(2 * np.log(1 + visits.sum()) / visits)
         behavior = Behavior(CONFIDENCE, bound=bound)
-        assert choose(behavior, 0, COSTS, visits, state) == np.argmin(lowest)
+        assert choose(behavior, 0, COSTS[None], visits[None], state) == np.argmin(lowest)
     chosen = {
-        choose(Behavior(CONFIDENCE, bound=b), 0, COSTS, visits, state) for b in (0.0, 0.5, 30.0)
+        choose(Behavior(CONFIDENCE, bound=b), 0, COSTS[None], visits[None], state)
+        for b in (0.0, 0.5, 30.0)
     }
     assert chosen == {1, 2}, "the bound changes what is chosen"
 

@@ -189,8 +189,8 @@ def test_offline_lambda_one_is_every_visit_monte_carlo() -> None:
 
 
 def chosen(behavior: Behavior, x: int, experience: Problem, random: np.ndarray) -> int:
-    row = np.zeros(experience.cost.shape[1])
-    return int(choose(behavior, x, row, row.astype(np.int32), random))
+    table = np.zeros(experience.cost.shape)
+    return int(choose(behavior, x, table, table.astype(np.int32), random))
 
 
 @pytest.mark.parametrize("explorer", [Behavior(), Behavior(CONFIDENCE), Behavior(decay=1.0)])

@@ -84,7 +84,7 @@ def draw_grid(
 
 def draw_pendulum(scene: Scene, picture: Picture, grid: PendulumGrid, walk: Walk) -> None:
     """The pendulum, and the relief of its table with the present state on it."""
-    scene.camera((2.15, -0.32, 1.95), (0.0, -0.32, 0.3))
+    scene.camera((2.4, -0.24, 2.1), (0.0, -0.24, 0.3))
     heights = _heights(picture).reshape(grid.shape)
     stride = max(1, -(-grid.q_nodes // MESH))
     some = (slice(None, None, stride), slice(None, None, stride))

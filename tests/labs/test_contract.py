@@ -95,8 +95,11 @@ class CheckingScene:
             assert np.isfinite(effort).all()
             assert (effort >= 0.0).all()
 
-    def trail(self, name: str, points: np.ndarray, color: Color = "actual") -> None:
+    def trail(
+        self, name: str, points: np.ndarray, color: Color = "actual", strength: float = 1.0
+    ) -> None:
         self._new(name, color)
+        assert 0.0 < strength <= 1.0
         assert points.ndim == 2
         assert points.shape[0] >= 2, "a line has two ends"
         assert points.shape[1] == 3

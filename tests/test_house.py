@@ -163,7 +163,7 @@ def test_public_names_are_documented(path: Path) -> None:
         ("labs/algorithms", 300),
         ("labs/models", 300),
         ("labs/reactive_control", 640),
-        ("labs/optimal_control", 350),
+        ("labs/optimal_control", 640),
         ("labs/reinforcement_learning", 350),
         ("labs/appendix", 450),
         ("server", 400),

@@ -296,8 +296,9 @@ GOOD: dict[str, Any] = {
     "a": np.eye(2),
     "b": np.ones((2, 1)),
     "q": np.eye(2),
-    "r": np.eye(1),
-} | {"q_final": np.eye(2)}
+    "r": ONE,
+    "q_final": np.eye(2),
+}
 
 
 @pytest.mark.parametrize(

@@ -79,13 +79,18 @@ class Recording:
     columns: Sequence[str]
     rows: np.ndarray
     channels: Mapping[str, np.ndarray]
+    solution: Mapping[str, Any] | None = None
+    """What was loaded into the solver at t = 0, as its JSON file has it; only `json` holds it."""
 
     def json(self) -> bytes:
-        """{...about, "channels": {name: values}}; a value that is not defined is null."""
+        """{...about, "solution"?, "channels": {name: values}}; a value that is not defined is
+        null."""
         import orjson  # on demand: a headless run without output needs no writer
 
         channels = {name: np.ascontiguousarray(a) for name, a in self.channels.items()}
-        return orjson.dumps({**self.about, "channels": channels}, option=orjson.OPT_SERIALIZE_NUMPY)
+        loaded = {"solution": self.solution} if self.solution else {}
+        whole = {**self.about, **loaded, "channels": channels}
+        return orjson.dumps(whole, option=orjson.OPT_SERIALIZE_NUMPY)
 
     def csv(self) -> bytes:
         """One line of about as a `#` comment, a header, a line a sample."""

@@ -321,23 +321,35 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
         )
 
     def solve(self, params: IntegrationParams, state: IntegrationState) -> Iterator[Snapshot]:
-        """One method an iteration: its errors for every step of LADDER, and its limit."""
+        """One method an iteration: its errors for every step of LADDER, and its limit. What was
+        found for other parameters stands until it is replaced."""
+        found = {
+            "global": state.global_errors,
+            "local": state.local_errors,
+            "cost": state.costs,
+            "limit": state.limits,
+        }
         for i, name in enumerate(NAMES):
             errors, local, costs, limit = errors_and_limit(*_key(name, params), params.start)
-            found = {"method": i, "global": errors, "local": local, "cost": costs, "limit": limit}
+            found = {
+                "global": _with(found["global"], i, errors),
+                "local": _with(found["local"], i, local),
+                "cost": _with(found["cost"], i, costs),
+                "limit": _with(found["limit"], i, limit),
+            }
             done = "All methods studied." if i == len(NAMES) - 1 else ""
-            yield Snapshot(i + 1, found, done)
+            yield Snapshot(i + 1, found, done, (i + 1) / len(NAMES))
 
     def accept(
         self, params: IntegrationParams, state: IntegrationState, snapshot: Snapshot
     ) -> IntegrationState:
-        data, i = snapshot.data, snapshot.data["method"]
+        data = snapshot.data
         return replace(
             state,
-            global_errors=_with(state.global_errors, i, data["global"]),
-            local_errors=_with(state.local_errors, i, data["local"]),
-            costs=_with(state.costs, i, data["cost"]),
-            limits=_with(state.limits, i, data["limit"]),
+            global_errors=data["global"],
+            local_errors=data["local"],
+            costs=data["cost"],
+            limits=data["limit"],
         )
 
     def measure(self, params: IntegrationParams, state: IntegrationState) -> Measurement:

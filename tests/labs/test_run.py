@@ -150,8 +150,8 @@ def test_a_solver_runs_to_the_end_before_time_starts() -> None:
     world = run("oscillator", {"guess": 2.0}, seconds=0.1)
     assert world.recording().channels["root"][1] == pytest.approx(math.sqrt(2.0), rel=1e-12)
     assert not world.solving
-    assert world.solution is not None
-    assert world.solution.done == "converged"
+    assert world.latest is not None
+    assert world.latest.done == "converged"
 
 
 def test_a_solve_change_starts_the_solver_again() -> None:

@@ -39,6 +39,8 @@ SMALLEST_MU = 1e-8
 """[unit of Q_uu] below this the regularisation is zero."""
 HALVINGS = 12
 """Of alpha, at most."""
+ROUNDING = 1e-14
+"""Changes below this part of J cannot be told from rounding: Newton's step is then trusted."""
 
 
 @dataclass(frozen=True)
@@ -220,16 +222,17 @@ def _search(problem: Problem, options: Options, at: Iterate, d_1: float, d_2: fl
         expected = alpha * d_1 + 0.5 * alpha**2 * d_2
         X, U, cost = rollout(problem, at.X, at.U + alpha * at.w, at.K)
         diverged += not np.isfinite(cost)
-        if expected < 0.0 and (cost - at.cost) / expected > options.c1:
+        unseen = max(abs(expected), abs(cost - at.cost)) <= ROUNDING * abs(at.cost)
+        ratio = 1.0 if unseen else (cost - at.cost) / expected
+        if expected < 0.0 and ratio > options.c1:
             less = at.mu / options.mu_factor
             less = less if less >= SMALLEST_MU else 0.0
-            good = (cost - at.cost) / expected >= options.c2
             return replace(
                 at,
                 X=X,
                 U=U,
                 cost=cost,
-                mu=less if good else more,
+                mu=less if ratio >= options.c2 else more,
                 alpha=alpha,
                 expected=expected,
                 actual=cost - at.cost,

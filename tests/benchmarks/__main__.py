@@ -5,10 +5,12 @@ Figures of one run stand side by side; compare ratios, not seconds, across machi
 import argparse
 import platform
 
-from tests.benchmarks import headless, latency, load
+from tests.benchmarks import ddp, headless, latency, load
 
 MEASURES = {
     "headless": headless.ratio_to_bare_calls,
+    "ddp": ddp.iteration_ratio,
+    "ddp-growth": ddp.growth,
     "slider": latency.slider_to_telemetry,
     "scene": latency.slider_to_scene,
     "page": latency.page_to_motion,

@@ -77,11 +77,7 @@ class World:
         """Begins anew with the parameters and the seed of a solution that was saved, and takes it
         in; the solver goes on from there. Raises LabError, and changes nothing then."""
         lab = self.lab
-        if solution.lab != self.entry.slug:
-            raise LabError(
-                f"this is a solution of {solution.lab!r}, and here is {self.entry.slug!r}: "
-                "load it there"
-            )
+        solution.check_lab(self.entry.slug)
         if not lab.has_solver():
             raise LabError(f"{self.entry.slug!r} has no solver: there is nothing to load")
         params = lab.Params().change(solution.params)
@@ -174,8 +170,8 @@ class World:
         self._note(Event(self.steps, "hold", handle, point))
 
     def advance(self) -> None:
-        """One period of simulated time, unless the world is in trouble."""
-        if self.state.trouble:
+        """One period of simulated time, unless the world is in trouble or there is none."""
+        if self.state.trouble or not self.lab.has_world():
             return
         inputs = Inputs(tuple(self._actions), self._handles)
         self._actions = []
@@ -371,6 +367,7 @@ def _changed(
     entry: Entry, solution: Solution, changes: Mapping[str, object], seed: int | None
 ) -> Solution:
     """The solution with other parameters: where they are another problem, it is not done."""
+    solution.check_lab(entry.slug)
     before = entry.lab.Params().change(solution.params)
     params = before.change(changes)
     other = {params.tunables[name].effect for name in params.differing(before)} - {"live"}

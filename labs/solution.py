@@ -139,6 +139,13 @@ class Solution:
 
     # Taking up --------------------------------------------------------------------------------
 
+    def check_lab(self, slug: str) -> None:
+        """Raises LabError unless it is a solution of this lab."""
+        if self.lab != slug:
+            raise LabError(
+                f"this is a solution of {self.lab!r}, and here is {slug!r}: load it there"
+            )
+
     def fitted(self, own: Sequence[Snapshot]) -> Mapping[str, Any]:
         """The data of a snapshot, put together as the lab's `own` first ones are.
 

@@ -69,6 +69,7 @@ export class SolverRow {
     if (document.activeElement !== this.pace) this.showPace(pace);
     const text = this.sentence(status);
     if (this.says.textContent !== text) this.says.textContent = this.says.title = text;
+    this.bar.parentElement.classList.toggle("over", Boolean(status.done));
     this.bar.style.width = `${100 * (status.progress ?? 0)}%`;
     this.showControls();
   }

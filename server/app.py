@@ -251,6 +251,8 @@ async def stream(socket: WebSocket, session_id: str) -> None:
             pass  # A page has nothing to say here: it uses the API.
     except (WebSocketDisconnect, RuntimeError):
         pass  # It left in the middle of a message.
+    except asyncio.CancelledError:
+        pass  # The server stops and waits no longer.
     finally:
         session.leave(viewer)
         sending.cancel()

@@ -112,9 +112,9 @@ class Solution:
             import orjson  # on demand, as for writing
 
             return cls.from_plain(orjson.loads(data))
-        except (ValueError, KeyError, TypeError, EOFError, RecursionError, OverflowError) as error:
+        except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError) as error:
             raise LabError(f"this is no solution saved by orclab ({_short(error)})") from None
-        except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError) as error:
+        except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError) as error:
             raise LabError(f"this NPZ file cannot be read ({_short(error)})") from None
 
     @classmethod

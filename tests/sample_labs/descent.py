@@ -72,7 +72,8 @@ class Descent(Lab[DescentParams, DescentState]):
         )
 
     def measure(self, params: DescentParams, state: DescentState) -> Measurement:
-        return {"best": state.best, "steps": float(state.steps)}
+        gone = float(np.linalg.norm(state.path[-1] - state.path[0]))
+        return {"best": state.best, "steps": float(state.steps), "gone": gone}
 
     def fields(self, params: DescentParams, state: DescentState) -> Mapping[str, np.ndarray]:
         return {"first": state.path[:, 0], "second": state.path[:, 1]}

@@ -243,7 +243,7 @@ def _replayed(options: argparse.Namespace) -> dict[str, Any]:
         }
     except OSError as error:
         raise LabError(f"--replay {path}: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise LabError(f"--replay {path}: not a JSON export of orclab ({error!r})") from None
 
 

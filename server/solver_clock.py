@@ -58,7 +58,8 @@ class SolverClock:
             self._world.show(self._world.latest.iteration)
 
     def _do_pause(self) -> None:
-        self.running, self._owed = False, 0
+        self.running = self._active = False
+        self._owed = 0
 
     def _do_step(self, count: int) -> None:
         self.running = False

@@ -2,6 +2,9 @@
 
 import os
 import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import psutil
@@ -143,6 +146,61 @@ def test_no_process_survives_the_server(how: signal.Signals) -> None:
     os.kill(server.process.pid, how)
     server.process.wait(20)
     assert not psutil.wait_procs(below, timeout=10)[1], "these survived"
+
+
+def test_the_first_start_may_take_its_time() -> None:
+    """Longer than a hung worker is given, and than a session nobody watches."""
+    slow = {"PREPARE_SECONDS": "8", "ORCLAB_HANG_SECONDS": "1", "ORCLAB_VIEWERLESS_SECONDS": "5"}
+    with Served(wait=False, **slow) as server:
+        assert server.health()["preparing"]
+        with server.session("oscillator") as session, session.stream() as stream:
+            assert stream.next("status", lambda s: s["t"] > 0)
+            assert not server.health()["preparing"]
+        assert server.process.stdout is not None
+        assert server.process.stdout.readline().startswith("First start: compiling the solvers")
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_a_server_that_still_prepares_ends_at_once(how: signal.Signals) -> None:
+    server = Served(wait=False, PREPARE_SECONDS="600")
+    assert server.process.stdout is not None
+    assert server.process.stdout.readline().startswith("First start")
+    below = server.workers()
+    assert below
+    server.stop(how)
+    assert not psutil.wait_procs(below, timeout=10)[1], "these survived"
+
+
+def test_a_server_with_stuck_viewers_ends_quietly(tmp_path: Path) -> None:
+    """Viewers that read nothing, and answer nothing when they are to close."""
+    said = tmp_path / "stderr"
+    with said.open("w") as stderr, Served(stderr=stderr) as server:
+        opened = [server.http.post("/api/sessions", json={"lab": "joint-control"}).json()]
+        script = (
+            "import sys, time\n"
+            "from websockets.sync.client import connect\n"
+            "scene, stream = sys.argv[1:]\n"
+            "kept = [connect(scene, subprotocols=['viser-v1.1.1']) for _ in range(12)]\n"
+            "kept += [connect(stream, max_queue=1) for _ in range(12)]\n"
+            "print('all are there', flush=True)\n"
+            "time.sleep(600)"
+        )
+        base = server.address.replace("http", "ws")
+        places = [base + opened[0]["scene"].rstrip("/"), base + opened[0]["stream"]]
+        viewers = subprocess.Popen(
+            [sys.executable, "-c", script, *places], stdout=subprocess.PIPE, text=True
+        )
+        assert viewers.stdout is not None
+        assert viewers.stdout.readline() == "all are there\n"
+        viewers.send_signal(signal.SIGSTOP)
+        try:
+            server.stop()
+        finally:
+            viewers.kill()
+            viewers.wait()
+    text = said.read_text()
+    assert "Traceback" not in text
+    assert "Exception" not in text
 
 
 def test_a_restarted_server_answers_404_for_the_old_session() -> None:

@@ -139,7 +139,10 @@ async def list_labs() -> list[LabInfo]:
 @api.post("/sessions", status_code=201)
 async def create_session(request: Request, new: NewSession) -> SessionInfo:
     """Opens a lab."""
-    session = await _sessions(request).create(find(new.lab), new)
+    try:
+        session = await _sessions(request).create(find(new.lab), new)
+    except asyncio.CancelledError:
+        raise NotNow("the server stops: start it again, and open the lab anew") from None
     return session.info()
 
 

@@ -150,8 +150,12 @@ def test_no_process_survives_the_server(how: signal.Signals) -> None:
 
 def test_the_first_start_may_take_its_time() -> None:
     """Longer than a hung worker is given, and than a session nobody watches."""
-    slow = {"PREPARE_SECONDS": "8", "ORCLAB_HANG_SECONDS": "1", "ORCLAB_VIEWERLESS_SECONDS": "5"}
-    with Served(wait=False, **slow) as server:
+    with Served(
+        wait=False,
+        PREPARE_SECONDS="8",
+        ORCLAB_HANG_SECONDS="1",
+        ORCLAB_VIEWERLESS_SECONDS="5",
+    ) as server:
         assert server.health()["preparing"]
         with server.session("oscillator") as session, session.stream() as stream:
             assert stream.next("status", lambda s: s["t"] > 0)

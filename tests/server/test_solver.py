@@ -22,8 +22,8 @@ from tests.served import Opened, Served, until
 LONG = {"many": 1000.0, "rate": 0.01}
 
 
-def standing(session: Opened) -> dict[str, Any]:
-    """The solver's status, now."""
+def standing(session: Opened) -> Any:
+    """The solver's status, now; None where there is no solver."""
     with session.stream() as stream:
         return stream.next("status")["solver"]
 

@@ -25,8 +25,8 @@ PUSH_STEPS = 10
 """World steps a push lasts: 0.2 s."""
 LONGEST_LAP = 6.0
 """[s]"""
-TRAIL = 150
-"""Points of a trail, one a step: 3 s."""
+TRAIL, SHORT_TRAIL = 150, 50
+"""Points of a cart's trail and of an arm's, one a step: 3 s and 1 s."""
 RISE, BEHIND = 0.25, -0.35
 """[m/s] a cart's reference comes down on its screen, and where that stands behind the rail [m]."""
 ARROW = 1.0 / 100.0
@@ -37,7 +37,7 @@ GAINS: tuple[tuple[str, Literal["line", "dash"]], ...] = (("q", "line"), ("v", "
 ACROSS, UPWARD = 1, 2
 """The world's axes of a cart and of a path in the horizontal plane, and of the others."""
 CAMERAS = {
-    "ur5": ((1.25, -0.55, 0.62), (0.28, 0.07, 0.34)),
+    "ur5": ((1.1, -0.42, 0.56), (0.29, 0.08, 0.35)),
     "cart-pole": ((2.1, 0.25, 1.1), (0.0, 0.0, 0.72)),
 }
 
@@ -321,7 +321,8 @@ class LqrTracking(Lab[TrackingParams, TrackingState]):
             "time ahead [s]",
             "K of the shoulder, or the cart",
         ),
-        Matrix("Gain now", "K", "K_t", shade=True),
+        Matrix("Gain now, by position", "K_position", "K_t", shade=True),
+        Matrix("Gain now, by velocity", "K_velocity", "K_t", shade=True),
         Readout("lap_paid", "Cost of a lap", ""),
         Readout("ghost_lap_paid", "Cost of a lap, ghost", ""),
         Readout("optimum", "Predicted optimum", ""),
@@ -435,7 +436,8 @@ class LqrTracking(Lab[TrackingParams, TrackingState]):
         gains, offsets = now.policy.gains, now.policy.offsets
         shown = gains[:, CHOSEN[params.robot]]
         nq, none = shown.shape[1] // 2, np.zeros(0)
-        found = {"K": now.gain, "ahead": H * np.arange(len(gains))}
+        found = {"K_position": now.gain[:, :nq], "K_velocity": now.gain[:, nq:]}
+        found["ahead"] = H * np.arange(len(gains))
         for i in range(MOST_MOTORS):
             found[f"k_{i + 1}"] = offsets[:, i] if i < offsets.shape[1] else none
             found[f"K_q{i + 1}"] = shown[:, i] if i < nq else none
@@ -472,7 +474,7 @@ class LqrTracking(Lab[TrackingParams, TrackingState]):
         planned = now.lap.x_ref[(now.index + np.arange(steps + 1)) % samples]
         rows = planned + deviations[: steps + 1]
         plan = np.array([tracked(robot, row[:nq]) for row in rows])
-        past, ghost_past = state.trails
+        past, ghost_past = state.trails[:, -SHORT_TRAIL:]
         if params.robot == "cart-pole":
             ahead, plan = _unrolled(ahead[:TRAIL]), _unrolled(plan)
             past, ghost_past = (_unrolled(trail[::-1], -1.0) for trail in state.trails)
@@ -485,7 +487,7 @@ class LqrTracking(Lab[TrackingParams, TrackingState]):
             scene.trail("ghost's past", ghost_past, "muted")
         goal = now.lap.points[now.index]
         scene.sphere("goal", goal, 0.014, "reference")
-        scene.handle("size", _handle(params, now.lap), 0.022)
+        scene.handle("size", _handle(params, now.lap), 0.018)
         if state.force != 0.0:
             tip = tracked(robot, state.x[:nq])
             scene.arrow("force", tip, tip + np.array([0.0, ARROW * state.force, 0.0]))

@@ -74,7 +74,7 @@ def test_the_affine_term_carries_the_arm(setting: Mapping[str, Value]) -> None:
     torque = channels["u"][last, 1]
     assert np.abs(torque).max() == pytest.approx(24.5, abs=0.1)
     assert np.abs(channels["feedback"][last, 1]).max() < 0.15 * np.abs(torque).max()
-    gain = world.lab.fields(world.params, world.state)["K"]
+    gain = world.lab.fields(world.params, world.state)["K_position"]
     assert gain[1, 1] == pytest.approx(-300.0, rel=0.1)
     _, cheaper = after(9.0, setting, effort_weight=0.1)
     assert cheaper["error"][last].max() < 1e-4
@@ -131,7 +131,7 @@ def test_a_linear_cost_is_another_reference(setting: Mapping[str, Value]) -> Non
 @ARTICLE.verify("A wind it knows, a wind it does not")
 def test_winds_known_and_unknown(setting: Mapping[str, Value]) -> None:
     world, channels = after(12.0, setting)
-    gain = world.lab.fields(world.params, world.state)["K"]
+    gain = world.lab.fields(world.params, world.state)["K_position"]
     assert gain[0, 0] == pytest.approx(34.8, abs=0.05)
     assert channels["p"][-1] == pytest.approx(-5.0 / gain[0, 0], rel=1e-4)
     assert channels["p"][-1] == pytest.approx(-0.1436, abs=1e-4)

@@ -47,21 +47,23 @@ def solve_at_once(problem: LqrProblem, x0: np.ndarray) -> np.ndarray:
             f"{LARGEST}: shorten the horizon, or solve this by Riccati"
         )
     h, g = trajectory_map(problem)
-    q, r = problem.terms["q"], problem.terms["r"]
+    by_x = np.broadcast_to(_roots(problem.terms["q"]), (steps, n, n)).copy()
+    by_x[:-1], by_x[-1] = by_x[1:], _roots(problem.terms["q_final"])[0]
+    by_u = np.broadcast_to(_roots(problem.terms["r"]), (steps, m, m))
     rows, target = np.zeros((steps * (n + m), steps * m)), np.zeros(steps * (n + m))
-    for t in range(steps):
-        weight = problem.q_final if t == steps - 1 else q[(t + 1) % len(q)]
-        ours = slice(t * n, (t + 1) * n)
-        rows[ours], target[ours] = _root(weight) @ g[ours], -_root(weight) @ h[ours] @ x0
-        begin = steps * n + t * m
-        rows[begin : begin + m, t * m : (t + 1) * m] = _root(r[t % len(r)])
-    orthogonal, triangle = np.linalg.qr(rows)
-    u: np.ndarray = solve_triangular(triangle, orthogonal.T @ target)
+    rows[: steps * n] = (by_x @ g.reshape(steps, n, steps * m)).reshape(steps * n, steps * m)
+    target[: steps * n] = -(by_x @ (h @ x0).reshape(steps, n, 1)).ravel()
+    last = rows[steps * n :].reshape(steps, m, steps, m)
+    last[range(steps), :, range(steps)] = by_u
+    triangle = np.asarray(np.linalg.qr(np.column_stack([rows, target]), mode="r"))
+    u: np.ndarray = solve_triangular(triangle[:-1, :-1], triangle[:-1, -1])
     return u.reshape(steps, m)
 
 
-def _root(weight: np.ndarray) -> np.ndarray:
-    """A matrix whose square, its transpose times itself, is the semidefinite weight."""
-    share, directions = np.linalg.eigh(weight)
-    root: np.ndarray = np.sqrt(np.clip(share, 0.0, None))[:, None] * directions.T
-    return root
+def _roots(weights: np.ndarray) -> np.ndarray:
+    """Matrices whose squares, transpose times itself, are these semidefinite ones (k, n, n)."""
+    share, directions = np.linalg.eigh(weights)
+    roots: np.ndarray = np.sqrt(np.clip(share, 0.0, None))[:, :, None] * directions.transpose(
+        0, 2, 1
+    )
+    return roots

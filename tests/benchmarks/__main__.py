@@ -5,14 +5,16 @@ Figures of one run stand side by side; compare ratios, not seconds, across machi
 import argparse
 import platform
 
-from tests.benchmarks import ddp, headless, latency, load
+from tests.benchmarks import ddp, headless, latency, load, lqr, resolve
 
 MEASURES = {
     "headless": headless.ratio_to_bare_calls,
     "ddp": ddp.iteration_ratio,
     "ddp-growth": ddp.growth,
+    "lqr": lqr.riccati,
     "slider": latency.slider_to_telemetry,
     "scene": latency.slider_to_scene,
+    "resolve": resolve.weight_to_motion,
     "page": latency.page_to_motion,
     "twelve": load.twelve,
     "growing": load.growing,

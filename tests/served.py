@@ -43,7 +43,8 @@ class Served:
         self._port = int(self.address.rsplit(":", 1)[1])
         self.http = httpx.Client(base_url=self.address, timeout=60)
         spares = int(self._environment.get("ORCLAB_SPARES", "1"))
-        until(lambda: not wait or self.health()["spares"] >= spares)
+        # A fresh checkout compiles the solvers first.
+        until(lambda: not wait or self.health()["spares"] >= spares, seconds=240)
 
     def __enter__(self) -> Self:
         return self

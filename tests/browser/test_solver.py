@@ -142,7 +142,7 @@ def test_nothing_overflows_and_nothing_jumps(
 
 
 def test_a_page_opened_at_the_first_start_says_what_goes_on(visit: Visit) -> None:
-    with Served(wait=False, PREPARE_SECONDS="12") as server:
+    with Served(wait=False, PREPARE_SECONDS="8") as server:
         page = visit(server).new_page()
         page.goto("/labs/descent")
         expect(page.locator("#curtain")).to_contain_text(
@@ -150,4 +150,4 @@ def test_a_page_opened_at_the_first_start_says_what_goes_on(visit: Visit) -> Non
         )
         expect(page.locator("#curtain .once")).to_be_visible()
         screenshot(page, "first-start")
-        LabPage(page).wait_live()
+        expect(page.locator("#curtain.open")).to_be_attached(timeout=120_000)

@@ -8,7 +8,7 @@ import pytest
 
 from labs.algorithms.periodic_lqr import Periodic
 from labs.catalog import find
-from labs.models.lap_tracking import known
+from labs.models.lap_tracking import known, view
 from labs.optimal_control.lqr_tracking import FARTHEST, LqrTracking, TrackingParams
 from labs.params import Value
 from labs.run import World
@@ -115,6 +115,10 @@ def test_how_far_ahead_is_far_enough(setting: Mapping[str, Value]) -> None:
     costs = [lap_cost(setting, preview=n) for n in (0.0, 10.0, 20.0, 40.0, 60.0, 100.0)]
     np.testing.assert_allclose(costs, [4671, 3153, 1764, 802, 705, 702], atol=0.6)
     assert lap_cost(setting) == costs[2]
+    along = TrackingParams.model_validate(setting).setting
+    steps_ahead = {10: 31.3, 40: 9.3, 58: 2.2}
+    for ahead, force in steps_ahead.items():
+        np.testing.assert_allclose(view(along, 99 - ahead, 60).k, force, atol=0.1)
 
 
 @ARTICLE.verify("A linear cost is another reference")

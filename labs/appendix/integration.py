@@ -324,18 +324,18 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
         """One method an iteration: its errors for every step of LADDER, and its limit. What was
         found for other parameters stands until it is replaced."""
         found = {
-            "global": state.global_errors,
-            "local": state.local_errors,
-            "cost": state.costs,
-            "limit": state.limits,
+            "global_errors": state.global_errors,
+            "local_errors": state.local_errors,
+            "costs": state.costs,
+            "limits": state.limits,
         }
         for i, name in enumerate(NAMES):
             errors, local, costs, limit = errors_and_limit(*_key(name, params), params.start)
             found = {
-                "global": _with(found["global"], i, errors),
-                "local": _with(found["local"], i, local),
-                "cost": _with(found["cost"], i, costs),
-                "limit": _with(found["limit"], i, limit),
+                "global_errors": _with(found["global_errors"], i, errors),
+                "local_errors": _with(found["local_errors"], i, local),
+                "costs": _with(found["costs"], i, costs),
+                "limits": _with(found["limits"], i, limit),
             }
             done = "All methods studied." if i == len(NAMES) - 1 else ""
             yield Snapshot(i + 1, found, done, (i + 1) / len(NAMES))
@@ -343,14 +343,7 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
     def accept(
         self, params: IntegrationParams, state: IntegrationState, snapshot: Snapshot
     ) -> IntegrationState:
-        data = snapshot.data
-        return replace(
-            state,
-            global_errors=data["global"],
-            local_errors=data["local"],
-            costs=data["cost"],
-            limits=data["limit"],
-        )
+        return replace(state, **snapshot.data)
 
     def measure(self, params: IntegrationParams, state: IntegrationState) -> Measurement:
         plant, own = params.plant, tableau_of(params.tableau)

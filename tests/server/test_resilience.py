@@ -2,15 +2,14 @@
 
 import os
 import signal
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import psutil
 import pytest
 
-from tests.served import Served, until
+from tests.served import Opened, Served, until
+from tests.viser_client import SceneClient
 
 
 def test_a_killed_worker_is_replaced_with_the_same_parameters(served: Served) -> None:
@@ -175,33 +174,17 @@ def test_a_server_that_still_prepares_ends_at_once(how: signal.Signals) -> None:
     assert not psutil.wait_procs(below, timeout=10)[1], "these survived"
 
 
-def test_a_server_with_stuck_viewers_ends_quietly(tmp_path: Path) -> None:
-    """Viewers that read nothing, and answer nothing when they are to close."""
+def test_a_server_ends_quietly_though_its_viewers_worker_is_stuck(tmp_path: Path) -> None:
+    """The scenes' relays wait for a worker that does not even close its connections."""
     said = tmp_path / "stderr"
-    with said.open("w") as stderr, Served(stderr=stderr) as server:
-        opened = [server.http.post("/api/sessions", json={"lab": "joint-control"}).json()]
-        script = (
-            "import sys, time\n"
-            "from websockets.sync.client import connect\n"
-            "scene, stream = sys.argv[1:]\n"
-            "kept = [connect(scene, subprotocols=['viser-v1.1.1']) for _ in range(12)]\n"
-            "kept += [connect(stream, max_queue=1) for _ in range(12)]\n"
-            "print('all are there', flush=True)\n"
-            "time.sleep(600)"
-        )
-        base = server.address.replace("http", "ws")
-        places = [base + opened[0]["scene"].rstrip("/"), base + opened[0]["stream"]]
-        viewers = subprocess.Popen(
-            [sys.executable, "-c", script, *places], stdout=subprocess.PIPE, text=True
-        )
-        assert viewers.stdout is not None
-        assert viewers.stdout.readline() == "all are there\n"
-        viewers.send_signal(signal.SIGSTOP)
-        try:
-            server.stop()
-        finally:
-            viewers.kill()
-            viewers.wait()
+    with said.open("w") as stderr, Served(ORCLAB_SPARES="0", stderr=stderr) as server:
+        session = Opened(server, "oscillator", {})
+        (worker,) = server.listeners()
+        viewers = [SceneClient(session) for _ in range(5)]
+        os.kill(worker, signal.SIGSTOP)
+        server.stop()
+        for viewer in viewers:
+            viewer.socket.close()
     text = said.read_text()
     assert "Traceback" not in text
     assert "Exception" not in text

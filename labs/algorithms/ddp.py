@@ -95,6 +95,8 @@ class Iterate:
     """Change of J that came."""
     gradient: float = 0.0
     """max |dJ/dU| where the last expansion was made, without what pushes against a bound."""
+    refused: bool = False
+    """Whether no step from here was accepted with mu = 0."""
     stopped: str = ""
     """Why no further iteration makes sense, in a sentence."""
     converged: bool = False
@@ -202,6 +204,13 @@ def _direction(problem: Problem, options: Options, model: Model, at: Iterate) ->
             )
             return Direction(at.w, at.K, mu, failed=why)
     if mu > 0.0 and -d_1 - 0.5 * d_2 <= options.tolerance * abs(at.cost):
+        if at.refused:
+            why = (
+                "Failed: the line search is exhausted: with small mu no step lowers the cost "
+                f"enough (c_1 = {options.c1:g}), and with mu = {mu:.0e} none is worth taking. "
+                "Lower c_1, or start from another first guess."
+            )
+            return Direction(at.w, at.K, at.mu, failed=why)
         # Is little expected because the end is near, or because mu holds w down?
         mu, (where, d_1, d_2) = 0.0, sweep(0.0)
         if where >= 0:
@@ -236,10 +245,11 @@ def _search(problem: Problem, options: Options, at: Iterate, d_1: float, d_2: fl
                 alpha=alpha,
                 expected=expected,
                 actual=cost - at.cost,
+                refused=False,
                 model=None,
             )
     if more <= options.mu_limit:
-        return replace(at, mu=more)
+        return replace(at, mu=more, refused=at.refused or at.mu == 0.0)
     why = (
         "every rollout along it diverges"
         if diverged > HALVINGS
@@ -262,5 +272,5 @@ def _unfinished(at: Iterate) -> str:
 def _farewell(at: Iterate) -> str:
     return (
         f"Converged after {at.iteration} iteration{'s'[: at.iteration != 1]}: a further step "
-        f"would lower the cost by {-at.expected:.1e} of {at.cost:.4g}."
+        f"would lower the cost by {abs(at.expected):.1e} of {at.cost:.4g}."
     )

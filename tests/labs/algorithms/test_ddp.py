@@ -295,8 +295,12 @@ def test_regularisation_at_its_limit_is_said() -> None:
     assert at.cost == ddp.init(negative, guess(p), Options()).cost, "nothing was moved"
 
 
-def test_a_line_search_without_end_is_said() -> None:
-    """A cost whose gradient has the wrong sign."""
+@pytest.mark.parametrize(
+    ("limit", "why"), [(100.0, "none of 13 step lengths"), (1e15, "with small mu no step lowers")]
+)
+def test_a_line_search_without_end_is_said(limit: float, why: str) -> None:
+    """A cost whose gradient has the wrong sign: mu grows to its limit, or until what it leaves
+    of a step is not worth taking."""
 
     class Wrong(MotionCost):
         def value(self, X: np.ndarray, U: np.ndarray) -> float:
@@ -306,9 +310,9 @@ def test_a_line_search_without_end_is_said() -> None:
     c = p.cost
     assert isinstance(c, MotionCost)
     wrong = Wrong(c.N, c.Q, c.R, c.Q_f, c.x_ref, c.u_ref)
-    at = ddp.solve(replace(p, cost=wrong), guess(p), Options(mu_limit=100.0))
+    at = ddp.solve(replace(p, cost=wrong), guess(p), Options(mu_limit=limit, tolerance=1e-8))
     assert not at.converged
-    assert at.stopped.startswith("Failed: the line search is exhausted: none of 13 step lengths")
+    assert at.stopped.startswith(f"Failed: the line search is exhausted: {why}")
     assert "c_1 = 0.001" in at.stopped
 
 

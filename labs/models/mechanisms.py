@@ -120,7 +120,8 @@ class Mechanism:
         jacobian: np.ndarray = pin.computeFrameJacobian(
             self.model, self.data, q, self.arm.tip, axes
         )
-        return jacobian[:3]
+        # Of a single joint, Pinocchio gives a vector.
+        return jacobian.reshape(6, -1)[:3]
 
 
 MECHANISMS: Mapping[str, tuple[Callable[[], Arm], tuple[int, ...]]] = {

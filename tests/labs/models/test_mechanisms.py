@@ -101,6 +101,15 @@ def test_what_holds_a_posture_holds_it() -> None:
     np.testing.assert_allclose(upright.holding(np.array([0.0, np.pi])), [0.0], atol=1e-9)
 
 
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_the_tips_jacobian_is_that_of_finite_differences(name: str) -> None:
+    mech = mechanism(name)
+    q, v = mech.arm.home + 0.3, np.linspace(0.4, 1.0, mech.nq)
+    moved = (mech.tip(q + 1e-6 * v) - mech.tip(q - 1e-6 * v)) / 2e-6
+    assert mech.tip_jacobian(q).shape == (3, mech.nq)
+    np.testing.assert_allclose(mech.tip_jacobian(q) @ v, moved, atol=1e-8)
+
+
 def test_what_cannot_be_is_said() -> None:
     with pytest.raises(LabError, match=r"acrobot cannot rest .* joint 1, which has no motor"):
         mechanism("acrobot").holding(np.array([0.5, 0.0]))

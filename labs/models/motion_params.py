@@ -31,7 +31,7 @@ class MotionParams(Params):
         group="Cost",
         scale="log",
         effect="solve",
-        help="Weight of the distance from the goal at the end: of the posture, or of the UR5's tip.",
+        help="Weight of the distance from the goal at the end: of the posture, or the UR5's tip.",
     )
     rest: float = knob(
         10.0,

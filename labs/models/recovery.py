@@ -110,6 +110,12 @@ class ClosedLoop:
         dx[:, [n - 1, 2 * n - 1]] = points
         return dx
 
+    def recovers_in_row(self, row: int) -> np.ndarray:
+        """Which points of this row of the plane's grid are brought back, (POINTS,) bool."""
+        places, speeds = axes(self.system)
+        points = np.column_stack([places, np.full(POINTS, speeds[row])])
+        return self.recovers(self.from_plane(points))
+
     def largest_lean(self) -> float:
         """The largest deviation [rad; m] from which it comes back from rest, and from all smaller
         ones alike, to a thousandth of the plane's width; zero if from none."""

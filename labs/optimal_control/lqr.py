@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -384,6 +384,10 @@ class Lqr(Lab[LqrParams, LqrState]):
     }
     actions = (Action("push", "Push", "Pushes the tip along +y for 0.2 s.", group="World"),)
 
+    @classmethod
+    def prepare(cls) -> None:
+        LqrParams().loop.recovers_in_row(0)
+
     def init(self, params: LqrParams, rng: np.random.Generator) -> LqrState:
         """At rest, off by the deviation: the pole, the pendulum, the mass or every joint."""
         system = params.linear_system
@@ -395,7 +399,7 @@ class Lqr(Lab[LqrParams, LqrState]):
             u=system.u_eq.copy(),
             force=np.zeros(3),
             path=system.in_plane(x)[None],
-            region=np.full((POINTS, POINTS), -1, np.int8),
+            region=np.full((POINTS, POINTS), -1),
             differences=np.zeros(COUNT),
             trouble=params.regulator.trouble,
         )
@@ -455,49 +459,37 @@ class Lqr(Lab[LqrParams, LqrState]):
     def solve(self, params: LqrParams, state: LqrState) -> Iterator[Snapshot]:
         """Row by row, where in the plane the policy recovers; then, horizon by horizon, what
         Riccati and least squares take for the same problem."""
-        law = params.regulator
+        law, p = params.regulator, params.regulator.problem
         if law.trouble:
             yield Snapshot(1, done=law.trouble)
             return
         rows = POINTS if params.system in CODES else 0
-        last, count = rows + (1 if rows else 0) + ROUNDS * COUNT, 0
-        if rows:
-            places, rates = axes(params.system)
-            for row, rate in enumerate(rates):
-                points = np.column_stack([places, np.full(POINTS, rate)])
-                back = params.loop.recovers(params.loop.from_plane(points))
-                count += 1
-                yield Snapshot(count, {"row": row, "back": back}, progress=count / last)
+        horizons = ROUNDS * tuple(enumerate(HORIZONS[params.system]))
+        last, count = rows + bool(rows) + len(horizons), 0
+        found: dict[str, Any] = {"region": state.region, "lean": -1.0}
+        found |= {name: np.zeros(COUNT) for name in ("differences", "riccati", "at_once")}
+        for row in range(rows):
+            found["region"] = _with(found["region"], row, params.loop.recovers_in_row(row))
             count += 1
-            yield Snapshot(count, {"lean": params.loop.largest_lean()}, progress=count / last)
-        p = law.problem
-        for _ in range(ROUNDS):
-            for i, horizon in enumerate(HORIZONS[params.system]):
-                found = compare(LqrProblem(horizon, p.a, p.b, p.q, p.r, p.q))
-                count += 1
-                data = {"horizon": i, "difference": found.difference}
-                data |= {"riccati": found.riccati, "at_once": found.least_squares}
-                done = _verdict(law) if count == last else ""
-                yield Snapshot(count, data, done, progress=count / last)
+            yield Snapshot(count, dict(found), progress=count / last)
+        if rows:
+            found["lean"] = params.loop.largest_lean()
+            count += 1
+            yield Snapshot(count, dict(found), progress=count / last)
+        for i, horizon in horizons:
+            both = compare(LqrProblem(horizon, p.a, p.b, p.q, p.r, p.q))
+            found["differences"] = _with(found["differences"], i, both.difference)
+            for name, took in (("riccati", both.riccati), ("at_once", both.least_squares)):
+                found[name] = _with(found[name], i, min(found[name][i] or np.inf, took))
+            count += 1
+            done = _verdict(law) if count == last else ""
+            yield Snapshot(count, dict(found), done, progress=count / last)
 
     def accept(self, params: LqrParams, state: LqrState, snapshot: Snapshot) -> LqrState:
-        data = snapshot.data
-        if "row" in data:
-            region = state.region.copy()
-            region[data["row"]] = data["back"]
-            return replace(state, region=region)
-        if "lean" in data:
-            return replace(state, lean=data["lean"])
-        if "horizon" not in data:
-            return state
-        i, differences = data["horizon"], state.differences.copy()
-        differences[i] = data["difference"]
-        seconds = {}
-        for name in ("riccati", "at_once"):
-            known = np.array(state.seconds.get(name, np.zeros(COUNT)))
-            known[i] = min(known[i] or np.inf, data[name])
-            seconds[name] = known
-        return replace(state, differences=differences, seconds=seconds)
+        found = dict(snapshot.data)
+        names = [name for name in ("riccati", "at_once") if name in found]
+        seconds: dict[str, Any] = {name: found.pop(name) for name in names}
+        return replace(state, **found, seconds=seconds)
 
     def measure(self, params: LqrParams, state: LqrState) -> Measurement:
         law, system = params.regulator, params.linear_system
@@ -567,6 +559,13 @@ class Lqr(Lab[LqrParams, LqrState]):
             push = _shortened(np.array([0.0, state.u[0], 0.0]))
             if np.abs(push).max() > 1e-3:
                 scene.arrow("control", at, at + push, "actual")
+
+
+def _with(array: np.ndarray, i: int, value: float | np.ndarray) -> np.ndarray:
+    """A copy of the array with another entry or row i."""
+    changed = array.copy()
+    changed[i] = value
+    return changed
 
 
 def _index(law: Regulator, state: LqrState) -> int:

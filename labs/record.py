@@ -51,12 +51,16 @@ class Recorder:
             grown = np.full((min(2 * len(self._rows), self._capacity), len(self.columns)), np.nan)
             grown[: len(self._rows)] = self._rows
             self._rows = grown
-        row = self._rows[place]
-        row.fill(np.nan)
+        self._rows[place] = self.row(t, measurement)
+        self.count += 1
+
+    def row(self, t: float, measurement: Measurement) -> np.ndarray:
+        """What `add` appends."""
+        row = np.full(len(self.columns), np.nan)
         row[0] = t
         for name, value in measurement.items():
             row[self._layout[name]] = value
-        self.count += 1
+        return row
 
     def since(self, count: int) -> np.ndarray:
         """The rows added after the first `count`, oldest first, as far as they are kept."""

@@ -202,6 +202,8 @@ class Telemetry(Message):
     run: int
     """Counts restarts: rows of another run are another curve."""
     rows: list[list[float | None]]
+    now: list[float | None] | None = None
+    """The state as it is, where it changed since the last sample without time going on."""
     fields: dict[str, Any] | None = None
     """Arrays for curves, heat maps, matrices and bars, a few times a second."""
 

@@ -5,13 +5,11 @@ Simulated time follows the wall clock at the chosen speed. When the machine is t
 behind, and says so; what is computed never depends on the wall clock."""
 
 import contextlib
-import ctypes
 import functools
 import logging
 import os
 import signal
 import socket
-import sys
 import threading
 import time
 from collections import deque
@@ -19,8 +17,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import viser
-import websockets.asyncio.server
 
 from labs.catalog import find
 from labs.errors import LabError
@@ -31,6 +29,7 @@ from server.mailbox import Item, Mailbox
 from server.messages import Hello, Status, Telemetry, View
 from server.panel import Panel
 from server.pipe import CONTROL, HELLO, STATUS, STREAM, Link
+from server.process import die_with_parent, viser_server
 from server.solver_clock import SolverClock
 from server.viser_scene import ViserScene
 
@@ -51,11 +50,11 @@ log = logging.getLogger("orclab.worker")
 
 def main(sock: socket.socket) -> None:
     """Runs until the web process closes the pipe."""
-    _die_with_parent()
+    die_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     link, mailbox = Link(sock), Mailbox()
     threading.Thread(target=_listen, args=(link, mailbox), daemon=True).start()
-    server = _viser()
+    server = viser_server()
     try:
         link.send(CONTROL, {"ready": True, "port": server.get_port()})
         opening = _wait_for_opening(link, mailbox)
@@ -83,6 +82,7 @@ class Live:
         self.panel = Panel(server, mailbox, self.world)
         self._sent_run = 0
         self._sent_rows = 0
+        self._measured: tuple[Any, Any] = (self.world.state, self.world.params)
         self._due = dict.fromkeys(("scene", "telemetry", "fields", "status"), 0.0)
         self._pace: deque[tuple[float, float]] = deque(maxlen=4)
         self._urgent = False
@@ -306,13 +306,26 @@ class Live:
         if wanted and self._beat("fields", now, FIELDS):
             found = self.world.lab.fields(self.world.params, self.world.state)
             fields = {name: found[name] for name in self._fields if name in found}
-        if self.viewers and (len(rows) or fields):
+        now_row = None if len(rows) else self._unrecorded()
+        if len(rows):
+            self._measured = self.world.state, self.world.params
+        if self.viewers and (len(rows) or fields or now_row is not None):
             message = Telemetry.model_construct(type="telemetry", run=self.world.runs, rows=rows)
             # float32 halves the text; a plot has no use for more digits.
             self.link.send(
                 STREAM,
-                vars(message) | {"rows": rows.astype("float32"), "fields": fields},
+                vars(message) | {"rows": rows.astype("float32"), "fields": fields, "now": now_row},
             )
+
+    def _unrecorded(self) -> np.ndarray | None:
+        """What a solver or a parameter has changed while the world stands still; once."""
+        state, params = self.world.state, self.world.params
+        known = state is self._measured[0] and params is self._measured[1]
+        if known or not self.viewers or self.failure:
+            return None
+        self._measured = state, params
+        measured = self.world.lab.measure(self.world.params, self.world.state)
+        return self.world.recorder.row(self.world.t, measured).astype("float32")
 
     def _status(self, now: float) -> None:
         if not self._pace or now - self._pace[-1][0] > 0.9 * STATUS_EVERY:
@@ -374,20 +387,3 @@ def _wait_for_opening(link: Link, mailbox: Mailbox) -> dict[str, Any]:
     for item in items[1:]:
         mailbox.put(item.do, item.ref, **item.arguments)
     return opening.arguments
-
-
-def _viser() -> viser.ViserServer:
-    """A Viser server on a free loopback port that no web page can reach past the proxy: browsers
-    always send an Origin, the proxy never does."""
-    websockets.asyncio.server.serve = functools.partial(  # type: ignore[assignment,misc]
-        websockets.asyncio.server.serve, origins=[None]
-    )
-    with Path(os.devnull).open("w") as silence, contextlib.redirect_stdout(silence):
-        return viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-
-
-def _die_with_parent() -> None:
-    """On Linux the kernel ends a worker whose parent dies, even one stuck in native code.
-    Elsewhere the closing pipe does."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG

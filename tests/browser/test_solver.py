@@ -71,6 +71,7 @@ def test_dragging_back_shows_what_was_and_its_end_the_latest(page: Page) -> None
     expect(page.locator("#iterations")).to_have_text("200")
     slider.press("Home")
     expect(page.locator("#iterations")).to_have_text("1 of 200")
+    expect(page.get_by_label("Cost")).to_have_text("1.70")
     page.keyboard.press("ArrowRight")
     expect(page.locator("#iterations")).to_have_text("2 of 200")
 

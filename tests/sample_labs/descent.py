@@ -10,7 +10,7 @@ import numpy as np
 
 from labs.lab import Lab, Measurement, Snapshot, State
 from labs.params import Params, knob
-from labs.plots import Curve
+from labs.plots import Curve, Readout
 from labs.scene import Scene
 
 BOWL = np.array([1.0, 10.0])
@@ -39,7 +39,10 @@ class Descent(Lab[DescentParams, DescentState]):
     section = "T.3"
     summary = "A point walks down a bowl."
     Params = DescentParams
-    plots = (Curve("Path", "first", "second", "x_1", "x_2"),)
+    plots = (
+        Curve("Path", "first", "second", "x_1", "x_2"),
+        Readout("best", "Cost", ""),
+    )
 
     def init(self, params: DescentParams, rng: np.random.Generator) -> DescentState:
         return DescentState()

@@ -113,6 +113,20 @@ def test_it_runs_by_itself_and_says_how_it_stands(served: Served) -> None:
         }
 
 
+def test_numbers_follow_the_solver_while_the_world_stands_still(served: Served) -> None:
+    with served.session("descent", params=LONG) as session, session.stream() as stream:
+        columns = stream.next("hello")["columns"]
+        at = columns.index("best")
+        session.command("solver_pause")
+        session.command("solver_step", count=3)
+        before = stream.next("telemetry", lambda m: m["now"])["now"][at]
+        session.command("solver_step", count=50)
+        assert stream.next("telemetry", lambda m: m["now"] and m["now"][at] < before)
+        session.command("solver_show", iteration=1)
+        back = stream.next("telemetry", lambda m: m["now"] and m["now"][at] > before)
+        assert back["rows"] == [], "what is looked at is not recorded"
+
+
 def test_a_lab_without_a_solver_says_so(served: Served) -> None:
     with served.session("troublesome") as session:
         assert standing(session) is None

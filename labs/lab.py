@@ -63,7 +63,9 @@ class Snapshot:
     iteration: int
     """From 1."""
     data: Mapping[str, Any] = field(default_factory=dict)
-    """Plain data that is never written into again: it may be accepted once more, to look back."""
+    """Plain data that is never written into again. It is complete: accepted once more, after later
+    ones or in a run begun anew, it shows this iteration. What is finite is saved with a solution;
+    durations [s] are not, and stand under "seconds", where `accept` may find nothing."""
     done: str = ""
     """Why the solver stopped, in a sentence; empty while it goes on."""
     progress: float | None = None

@@ -51,12 +51,16 @@ class Recorder:
             grown = np.full((min(2 * len(self._rows), self._capacity), len(self.columns)), np.nan)
             grown[: len(self._rows)] = self._rows
             self._rows = grown
-        row = self._rows[place]
-        row.fill(np.nan)
+        self._rows[place] = self.row(t, measurement)
+        self.count += 1
+
+    def row(self, t: float, measurement: Measurement) -> np.ndarray:
+        """What `add` appends."""
+        row = np.full(len(self.columns), np.nan)
         row[0] = t
         for name, value in measurement.items():
             row[self._layout[name]] = value
-        self.count += 1
+        return row
 
     def since(self, count: int) -> np.ndarray:
         """The rows added after the first `count`, oldest first, as far as they are kept."""
@@ -79,13 +83,18 @@ class Recording:
     columns: Sequence[str]
     rows: np.ndarray
     channels: Mapping[str, np.ndarray]
+    solution: Mapping[str, Any] | None = None
+    """What was loaded into the solver at t = 0, as its JSON file has it; only `json` holds it."""
 
     def json(self) -> bytes:
-        """{...about, "channels": {name: values}}; a value that is not defined is null."""
+        """{...about, "solution"?, "channels": {name: values}}; a value that is not defined is
+        null."""
         import orjson  # on demand: a headless run without output needs no writer
 
         channels = {name: np.ascontiguousarray(a) for name, a in self.channels.items()}
-        return orjson.dumps({**self.about, "channels": channels}, option=orjson.OPT_SERIALIZE_NUMPY)
+        loaded = {"solution": self.solution} if self.solution else {}
+        whole = {**self.about, **loaded, "channels": channels}
+        return orjson.dumps(whole, option=orjson.OPT_SERIALIZE_NUMPY)
 
     def csv(self) -> bytes:
         """One line of about as a `#` comment, a header, a line a sample."""

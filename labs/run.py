@@ -6,7 +6,8 @@ pressed or dragged, and before which step. Wall-clock time appears nowhere.
 
 import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any, Literal
 
 import numpy as np
@@ -17,6 +18,9 @@ from labs.lab import Inputs, Snapshot
 from labs.params import Value
 from labs.plots import Readout
 from labs.record import LIVE_ROWS, Recorder, Recording, versions
+from labs.scene import NullScene
+from labs.snapshots import Snapshots
+from labs.solution import Solution
 
 MAX_EVENTS = 20_000
 MAX_STEPS = 2_000_000
@@ -26,7 +30,8 @@ Point = tuple[float, float, float]
 @dataclass(frozen=True)
 class Event:
     """Something done to the world before step `step`: parameters changed, an action pressed, a
-    handle held at a point or released (None), solver iterations taken in."""
+    handle held at a point or released (None), solver iterations taken in ("iterate", how many) or
+    looked back at ("show", which)."""
 
     step: int
     kind: Literal["set", "press", "hold", "solve"]
@@ -37,13 +42,19 @@ class Event:
 class World:
     """A lab in motion."""
 
+    shown: Snapshot | None
+    """What the state holds of the solver; None until there is something."""
+    _solver: Iterator[Snapshot] | None
+
     def __init__(
         self,
         entry: Entry,
         changes: Mapping[str, object] | None = None,
         seed: int = 0,
         capacity: int = LIVE_ROWS,
+        solution: Solution | None = None,
     ) -> None:
+        """With a `solution`, its parameters and seed hold, and it is taken in at t = 0."""
         self.entry = entry
         self.lab = entry.lab
         self.params = self.lab.Params().change(changes or {})
@@ -51,10 +62,45 @@ class World:
         self._capacity = capacity
         self.runs = 0
         """Counts restarts."""
-        self.reset()
+        self.solves = 0
+        """Counts how often the solver was started."""
+        if solution:
+            self.load(solution)
+        else:
+            self.reset()
 
     def reset(self) -> None:
         """Back to t = 0 with the present parameters; recording and events begin anew."""
+        self._begin(None, None)
+
+    def load(self, solution: Solution) -> None:
+        """Begins anew with the parameters and the seed of a solution that was saved, and takes it
+        in; the solver goes on from there. Raises LabError, and changes nothing then."""
+        lab = self.lab
+        solution.check_lab(self.entry.slug)
+        if not lab.has_solver():
+            raise LabError(f"{self.entry.slug!r} has no solver: there is nothing to load")
+        params = lab.Params().change(solution.params)
+        state = lab.init(params, np.random.default_rng(solution.seed))
+        own = list(islice(lab.solve(params, state), 2))
+        if not own:
+            raise LabError("with these parameters the solver finds nothing to compare with")
+        snapshot = solution.snapshot(own)
+        try:
+            state = lab.accept(params, state, snapshot)
+            lab.measure(params, state)
+            lab.fields(params, state)
+            lab.draw(NullScene(), params, state)
+        except Exception as error:
+            # Whatever a lab makes of numbers that are not its own, the run before goes on.
+            raise LabError(
+                f"this lab cannot show the solution ({type(error).__name__}: {error}): "
+                "it is of another version, or was changed"
+            ) from error
+        self.params, self.seed = params, solution.seed
+        self._begin(snapshot, solution)
+
+    def _begin(self, snapshot: Snapshot | None, solution: Solution | None) -> None:
         self.runs += 1
         self.steps = 0
         self.initial = self.params
@@ -64,8 +110,11 @@ class World:
         self._actions: list[str] = []
         self._handles: dict[str, Point] = {}
         self.state = self.lab.init(self.params, np.random.default_rng(self.seed))
-        self.solution: Snapshot | None = None
-        self._solver = self._start_solver()
+        self.loaded = solution
+        """What this run began with."""
+        if snapshot:
+            self.state = self.lab.accept(self.params, self.state, snapshot)
+        self._start_solver(snapshot)
         if self.solving:
             # Says that the events tell how far the solver went, even if it goes nowhere.
             self._note(Event(0, "solve", "iterate", 0))
@@ -98,7 +147,7 @@ class World:
         for name, value in changed.items():
             self._note(Event(self.steps, "set", name, value))
         if "solve" in effects:
-            self._solver = self._start_solver()
+            self._start_solver(None)
 
     def press(self, action: str) -> None:
         """Presses one of the lab's actions."""
@@ -121,8 +170,8 @@ class World:
         self._note(Event(self.steps, "hold", handle, point))
 
     def advance(self) -> None:
-        """One period of simulated time, unless the world is in trouble."""
-        if self.state.trouble:
+        """One period of simulated time, unless the world is in trouble or there is none."""
+        if self.state.trouble or not self.lab.has_world():
             return
         inputs = Inputs(tuple(self._actions), self._handles)
         self._actions = []
@@ -131,32 +180,71 @@ class World:
         self.steps += 1
         self.recorder.add(self.t, self.lab.measure(self.params, self.state))
 
+    # The solver's clock ---------------------------------------------------------------------
+
     @property
     def solving(self) -> bool:
         """Whether the solver has iterations left."""
         return self._solver is not None
 
+    @property
+    def latest(self) -> Snapshot | None:
+        """The last thing the solver found, since it was started."""
+        return self.kept.last
+
     def iterate(self) -> None:
-        """One iteration of the solver, taken into the state."""
+        """One iteration of the solver, taken into the state: from the latest on, wherever one
+        looked back to."""
         if self._solver is None:
             return
         snapshot = next(self._solver, None)
         if snapshot is None or snapshot.done:
             self._solver = None
-        if snapshot is not None:
-            self.solution = snapshot
-            self.state = self.lab.accept(self.params, self.state, snapshot)
-            self._note(Event(self.steps, "solve", "iterate", 1))
+        if snapshot is None:
+            return
+        if self.latest and self.shown is not self.latest:
+            self._accept(self.latest)
+        snapshot = replace(snapshot, iteration=self._before + snapshot.iteration)
+        self.kept.add(snapshot)
+        self._accept(snapshot)
+        self._note(Event(self.steps, "solve", "iterate", 1))
 
-    def _start_solver(self) -> Iterator[Snapshot] | None:
-        return self.lab.solve(self.params, self.state) if self.lab.has_solver() else None
+    def show(self, iteration: int) -> None:
+        """Looks back at an iteration: the nearest kept one not after it. Raises ParameterError."""
+        snapshot = self.kept.at(iteration)
+        if snapshot is None:
+            raise ParameterError("there is no iteration of the solver to look back at yet")
+        self._accept(snapshot)
+        self._note(Event(self.steps, "solve", "show", snapshot.iteration))
+
+    def solution(self) -> Solution:
+        """What is shown of the solver, to be saved. Raises LabError."""
+        if self.shown is None:
+            raise LabError("the solver has found nothing yet that could be saved")
+        params = self.params.model_dump()
+        return Solution.of(self.entry.slug, params, self.seed, self.shown)
+
+    def _accept(self, snapshot: Snapshot) -> None:
+        self.state = self.lab.accept(self.params, self.state, snapshot)
+        self.shown = snapshot
+
+    def _start_solver(self, found: Snapshot | None) -> None:
+        """From the present state, which holds what was `found` before."""
+        self.solves += 1
+        self.kept = Snapshots()
+        self.shown = found
+        self._before = found.iteration if found else 0
+        if found:
+            self.kept.add(found)
+        has = self.lab.has_solver()
+        self._solver = self.lab.solve(self.params, self.state) if has else None
 
     def _note(self, event: Event) -> None:
         last = self.events[-1] if self.events else None
         same = last and (last.step, last.kind, last.name) == (event.step, event.kind, event.name)
-        if last and same and event.kind == "solve":
-            self.events[-1] = Event(event.step, "solve", event.name, last.value + 1)
-        elif same and (event.kind == "hold" or self._is_live(event)):
+        if last and same and event.name == "iterate":
+            self.events[-1] = replace(event, value=last.value + event.value)
+        elif same and (event.kind in ("hold", "solve") or self._is_live(event)):
             self.events[-1] = event
         elif len(self.events) < MAX_EVENTS:
             self.events.append(event)
@@ -186,12 +274,18 @@ class World:
             "trouble": self.trouble,
             "versions": versions(),
         }
-        return Recording(about, self.recorder.columns, rows, self.recorder.channels())
+        solution = self.loaded.plain() if self.loaded else None
+        return Recording(about, self.recorder.columns, rows, self.recorder.channels(), solution)
 
     def command(self) -> str:
         """The `orclab run` line that reproduces this run up to now.
 
         Raises LabError where a line cannot hold it (hundreds of changes, as by dragging)."""
+        if self.loaded:
+            raise LabError(
+                "this run began with a loaded solution, which no command line holds: export it as "
+                "JSON and use orclab run --replay FILE"
+            )
         if not self.complete or len(self.events) > 200:
             raise LabError(
                 f"{len(self.events)} changes are too many for a command line: export the run as "
@@ -212,7 +306,7 @@ class World:
                     where = "release" if event.value is None else ",".join(map(repr, event.value))
                     words += ["--at", at, f"hold={event.name}:{where}"]
                 case "solve":
-                    words += ["--at", at, f"iterate={event.value}"]
+                    words += ["--at", at, f"{event.name}={event.value}"]
         return shlex.join(words)
 
 
@@ -221,15 +315,17 @@ def run(
     changes: Mapping[str, object] | None = None,
     *,
     seconds: float = 10.0,
-    seed: int = 0,
+    seed: int | None = None,
     events: Iterable[Event] = (),
+    solution: Solution | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> World:
     """Runs a lab headless to the end of `seconds`, or to trouble.
 
     `events` are applied before the step they name. A lab with a solver is solved to the end
-    before time starts and after each change, unless `events` say how far. `progress` hears the
-    part done in [0, 1]."""
+    before time starts and after each change, unless `events` say how far. It starts from a
+    `solution`, if given, with its parameters but for the `changes`, and its seed (else 0). A
+    solution that is done is not solved further. `progress` hears the part done in [0, 1]."""
     entry = find(slug)
     period = entry.lab.period
     if not 0 <= seconds <= MAX_STEPS * period:
@@ -238,13 +334,17 @@ def run(
         )
     steps = round(seconds / period) if entry.lab.has_world() else 0
     todo = sorted(events, key=lambda event: event.step)
-    world = World(entry, changes, seed, capacity=steps + 1)
-    told = any(event.kind == "solve" for event in todo)
+    if solution:
+        solution = _changed(entry, solution, changes or {}, seed)
+    world = World(entry, changes, seed or 0, steps + 1, solution)
+    told = any(event.name == "iterate" for event in todo if event.kind == "solve")
     for step in range(steps + 1):
         while todo and todo[0].step <= step:
+            if todo[0].name == "show" and not told:
+                _solve(world)
             _apply(world, todo.pop(0))
-        while world.solving and not told:
-            world.iterate()
+        if not told:
+            _solve(world)
         if step == steps or world.trouble:
             break
         world.advance()
@@ -255,6 +355,28 @@ def run(
         if not world.trouble:
             raise ParameterError(f"a change at {last:g} s lies beyond the run's {seconds:g} s")
     return world
+
+
+def _solve(world: World) -> None:
+    """To the end, unless a loaded solution was there already."""
+    while world.solving and not (world.latest and world.latest.done):
+        world.iterate()
+
+
+def _changed(
+    entry: Entry, solution: Solution, changes: Mapping[str, object], seed: int | None
+) -> Solution:
+    """The solution with other parameters: where they are another problem, it is not done."""
+    solution.check_lab(entry.slug)
+    before = entry.lab.Params().change(solution.params)
+    params = before.change(changes)
+    other = {params.tunables[name].effect for name in params.differing(before)} - {"live"}
+    return replace(
+        solution,
+        params=params.model_dump(),
+        seed=solution.seed if seed is None else seed,
+        done="" if other else solution.done,
+    )
 
 
 def events_of(about: Mapping[str, Any]) -> list[Event]:
@@ -276,7 +398,7 @@ def _event_of(change: Mapping[str, Any]) -> Event:
             numbers = len(point) == 3 and all(type(x) in (int, float) for x in point)
             sound = value is None or numbers
         case "solve":
-            sound = type(value) is int and value >= 0
+            sound = name in ("iterate", "show") and type(value) is int and value >= 0
         case _:
             sound = False
     if not (sound and type(step) is int and step >= 0 and isinstance(name, str)):
@@ -286,7 +408,8 @@ def _event_of(change: Mapping[str, Any]) -> Event:
 
 def parse_event(entry: Entry, at: str, what: str) -> Event:
     """An event from a command line: `--at 2.5 kp=500`, `--at 3 press=push`,
-    `--at 4 hold=pull:0.1,0.2,0.3`, `--at 5 hold=pull:release`. Raises ParameterError."""
+    `--at 4 hold=pull:0.1,0.2,0.3`, `--at 5 hold=pull:release`, `--at 0 iterate=20`,
+    `--at 6 show=3`. Raises ParameterError."""
     try:
         step = round(float(at) / entry.lab.period)
     except (ValueError, OverflowError):
@@ -300,8 +423,8 @@ def parse_event(entry: Entry, at: str, what: str) -> Event:
         case "hold":
             handle, _, where = value.partition(":")
             return Event(step, "hold", handle, _point(where))
-        case "iterate" if value.isdecimal():
-            return Event(step, "solve", "iterate", int(value))
+        case "iterate" | "show" if value.isdecimal():
+            return Event(step, "solve", name, int(value))
         case _:
             return Event(step, "set", name, entry.lab.Params.read({name: value})[name])
 
@@ -327,6 +450,8 @@ def _apply(world: World, event: Event) -> None:
             world.press(event.name)
         case "hold":
             world.hold(event.name, event.value and tuple(event.value))
+        case "solve" if event.name == "show":
+            world.show(event.value)
         case "solve":
             left = event.value
             while left and world.solving:

@@ -36,8 +36,11 @@ class Scene(Protocol):
         joints near their limit wear a ring, amber from 0.8, red at 1."""
         ...
 
-    def trail(self, name: str, points: np.ndarray, color: Color = "actual") -> None:
-        """A polyline through `points` (k, 3) [m]."""
+    def trail(
+        self, name: str, points: np.ndarray, color: Color = "actual", strength: float = 1.0
+    ) -> None:
+        """A polyline through `points` (k, 3) [m]. Of a lower `strength`, in (0, 1], it is paler:
+        so that what was tried before fades behind what is tried now."""
         ...
 
     def arrow(self, name: str, start: ArrayLike, end: ArrayLike, color: Color = "force") -> None:
@@ -131,7 +134,9 @@ class NullScene:
     ) -> None:
         self.names.append(name)
 
-    def trail(self, name: str, points: np.ndarray, color: Color = "actual") -> None:
+    def trail(
+        self, name: str, points: np.ndarray, color: Color = "actual", strength: float = 1.0
+    ) -> None:
         self.names.append(name)
 
     def arrow(self, name: str, start: ArrayLike, end: ArrayLike, color: Color = "force") -> None:

@@ -114,6 +114,7 @@ async def healthz(request: Request) -> Health:
         sessions=len(state.sessions),
         workers=state.supervisor.count,
         spares=state.supervisor.spares,
+        preparing=state.supervisor.preparing,
     )
 
 
@@ -138,7 +139,10 @@ async def list_labs() -> list[LabInfo]:
 @api.post("/sessions", status_code=201)
 async def create_session(request: Request, new: NewSession) -> SessionInfo:
     """Opens a lab."""
-    session = await _sessions(request).create(find(new.lab), new)
+    try:
+        session = await _sessions(request).create(find(new.lab), new)
+    except asyncio.CancelledError:
+        raise NotNow("the server stops: start it again, and open the lab anew") from None
     return session.info()
 
 
@@ -164,7 +168,8 @@ async def change_params(
 
 @api.post("/sessions/{session_id}/commands", status_code=204)
 async def command(request: Request, session_id: str, command: Annotated[Command, Body()]) -> None:
-    """Run, pause, step, reset, speed, seed, apply, press, view."""
+    """Run, pause, step, reset, speed, seed, apply, press, view; and of the solver run, pause,
+    step, show, pace."""
     session = _session(request, session_id)
     if isinstance(command, Apply):
         defaults: Params = session.entry.lab.Params()
@@ -190,19 +195,46 @@ async def export(
 ) -> FileResponse:
     """The recorded run: channels, parameters and their changes, versions, what it covers."""
     session = _session(request, session_id)
-    with tempfile.NamedTemporaryFile(dir=request.app.state.folder, delete=False) as file:
-        path = Path(file.name)
+    return await _file(request, session, "export", form, f"{session.entry.slug}.{form}")
+
+
+@api.get(
+    "/sessions/{session_id}/solution.{form}",
+    response_class=FileResponse,
+    responses={200: {"content": {MEDIA[form]: {} for form in ("json", "npz")}}},
+)
+async def save_solution(
+    request: Request, session_id: str, form: Literal["json", "npz"]
+) -> FileResponse:
+    """What is shown of the solver, with the parameters and the seed it belongs to."""
+    session = _session(request, session_id)
+    return await _file(request, session, "solution", form, f"{session.entry.slug}-solution.{form}")
+
+
+@api.put(
+    "/sessions/{session_id}/solution",
+    openapi_extra={
+        "requestBody": {
+            "required": True,
+            "content": {
+                media: {"schema": {"type": "string", "format": "binary"}}
+                for media in (MEDIA["json"], MEDIA["npz"])
+            },
+        }
+    },
+)
+async def load_solution(request: Request, session_id: str) -> ParamValues:
+    """Begins anew with a saved solution (the file, JSON or NPZ) and its parameters, and pauses
+    the solver, which goes on from there; answers all parameters."""
+    session = _session(request, session_id)
+    path = _temporary(request)
     try:
-        await session.write(form, str(path))
-    except BaseException:
+        with path.open("wb") as file:
+            async for part in request.stream():
+                file.write(part)
+        return ParamValues(params=await session.load(str(path)))
+    finally:
         path.unlink()
-        raise
-    return FileResponse(
-        path,
-        media_type=MEDIA[form],
-        filename=f"{session.entry.slug}.{form}",
-        background=BackgroundTask(path.unlink),
-    )
 
 
 @api.websocket("/sessions/{session_id}/stream")
@@ -222,6 +254,8 @@ async def stream(socket: WebSocket, session_id: str) -> None:
             pass  # A page has nothing to say here: it uses the API.
     except (WebSocketDisconnect, RuntimeError):
         pass  # It left in the middle of a message.
+    except asyncio.CancelledError:
+        pass  # The server stops and waits no longer.
     finally:
         session.leave(viewer)
         sending.cancel()
@@ -233,6 +267,26 @@ async def _send(socket: WebSocket, viewer: Viewer) -> None:
             await asyncio.wait_for(socket.send_text(payload.decode()), SEND_SECONDS)
     with contextlib.suppress(WebSocketDisconnect, RuntimeError):
         await socket.close(ENDED)
+
+
+async def _file(
+    request: Request, session: Session, what: str, form: str, name: str
+) -> FileResponse:
+    """A file that the session's worker writes."""
+    path = _temporary(request)
+    try:
+        await session.write(what, form, str(path))
+    except BaseException:
+        path.unlink()
+        raise
+    return FileResponse(
+        path, media_type=MEDIA[form], filename=name, background=BackgroundTask(path.unlink)
+    )
+
+
+def _temporary(request: Request) -> Path:
+    with tempfile.NamedTemporaryFile(dir=request.app.state.folder, delete=False) as file:
+        return Path(file.name)
 
 
 def _sessions(request: Request) -> Sessions:

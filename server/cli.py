@@ -5,7 +5,7 @@ import asyncio
 import json
 import socket
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,9 @@ from pydantic import ValidationError
 from labs.catalog import catalog, find
 from labs.errors import LabError
 from labs.record import versions
-from labs.run import Event, events_of, parse_event, run
+from labs.run import Event, World, events_of, parse_event, run
+from labs.solution import FORMS as SOLUTION_FORMS
+from labs.solution import Solution
 
 FORMS = ("json", "csv", "npz")
 
@@ -57,13 +59,19 @@ def _parser() -> argparse.ArgumentParser:
         nargs=2,
         metavar=("T", "K=V"),
         help="a change at T seconds: a parameter, press=ACTION, hold=HANDLE:x,y,z or "
-        "hold=HANDLE:release",
+        "hold=HANDLE:release; or of the solver iterate=N or show=ITERATION",
     )
     runner.add_argument("--seconds", type=float, help="simulated time (10)")
-    runner.add_argument("--seed", type=int, help="seed of all randomness (0)")
+    runner.add_argument("--seed", type=int, help="seed of all randomness (0, or the solution's)")
     runner.add_argument("--replay", type=Path, metavar="F.json", help="run an exported run again")
     runner.add_argument(
         "--out", type=Path, metavar="F", help="write the trajectory: F.json, F.csv or F.npz"
+    )
+    runner.add_argument(
+        "--solution", type=Path, metavar="F", help="start from a solution: F.json or F.npz"
+    )
+    runner.add_argument(
+        "--solution-out", type=Path, metavar="F", help="write the solution: F.json or F.npz"
     )
     return parser
 
@@ -157,21 +165,25 @@ def _list(_: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    form = options.out.suffix[1:] if options.out else ""
-    if options.out and form not in FORMS:
-        raise LabError(f"--out {options.out}: the file is named F.json, F.csv or F.npz")
-    if options.out and not options.out.parent.is_dir():
-        raise LabError(f"--out {options.out}: there is no folder {options.out.parent}")
+    outputs: list[tuple[str, Path, Callable[[World, str], bytes]]] = []
+    if options.out:
+        _check_output("--out", options.out, FORMS)
+        outputs.append(("--out", options.out, lambda world, form: world.recording().write(form)))
+    if options.solution_out:
+        _check_output("--solution-out", options.solution_out, SOLUTION_FORMS)
+        outputs.append(
+            ("--solution-out", options.solution_out, lambda w, form: w.solution().write(form))
+        )
     plan = _replayed(options) if options.replay else _planned(options)
     if options.seconds is not None:
         plan["seconds"] = options.seconds
     world = run(**plan, progress=_progress if sys.stderr.isatty() else None)
-    if options.out:
+    for option, path, content in outputs:
         try:
-            options.out.write_bytes(world.recording().write(form))
+            path.write_bytes(content(world, path.suffix[1:]))
         except OSError as error:
-            raise LabError(f"--out {options.out}: {error.strerror}") from None
-        print(f"wrote {options.out}", file=sys.stderr)
+            raise LabError(f"{option} {path}: {error.strerror}") from None
+        print(f"wrote {path}", file=sys.stderr)
     if world.trouble:
         print(world.trouble, file=sys.stderr)
     measured = {
@@ -181,6 +193,14 @@ def _run(options: argparse.Namespace) -> int:
     final = {"lab": world.entry.slug, "seed": world.seed, "t": world.t, "trouble": world.trouble}
     print(json.dumps(final | measured))
     return 0
+
+
+def _check_output(option: str, path: Path, forms: Sequence[str]) -> None:
+    if path.suffix[1:] not in forms:
+        *first, last = (f"F.{form}" for form in forms)
+        raise LabError(f"{option} {path}: the file is named {', '.join(first)} or {last}")
+    if not path.parent.is_dir():
+        raise LabError(f"{option} {path}: there is no folder {path.parent}")
 
 
 def _planned(options: argparse.Namespace) -> dict[str, Any]:
@@ -193,12 +213,22 @@ def _planned(options: argparse.Namespace) -> dict[str, Any]:
         "changes": entry.lab.Params.read(texts),
         "seed": _seed(options.seed),
         "events": [parse_event(entry, at, what) for at, what in options.at],
+        "solution": _solution(options.solution) if options.solution else None,
     }
+
+
+def _solution(path: Path) -> Solution:
+    try:
+        return Solution.read(path.read_bytes())
+    except OSError as error:
+        raise LabError(f"--solution {path}: {error.strerror}") from None
+    except LabError as error:
+        raise LabError(f"--solution {path}: {error}") from None
 
 
 def _replayed(options: argparse.Namespace) -> dict[str, Any]:
     path = options.replay
-    if options.lab or options.set or options.at or options.seed is not None:
+    if options.lab or options.set or options.at or options.seed is not None or options.solution:
         raise LabError("--replay takes the lab, its parameters, changes and seed from the file")
     try:
         about = json.loads(path.read_bytes())
@@ -209,10 +239,11 @@ def _replayed(options: argparse.Namespace) -> dict[str, Any]:
             "seed": _seed(int(about["seed"])),
             "seconds": float(about["covers"]["to"]),
             "events": events,
+            "solution": Solution.from_plain(about["solution"]) if "solution" in about else None,
         }
     except OSError as error:
         raise LabError(f"--replay {path}: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise LabError(f"--replay {path}: not a JSON export of orclab ({error!r})") from None
 
 
@@ -222,10 +253,10 @@ def _port(text: str) -> int:
     return int(text)
 
 
-def _seed(seed: int | None) -> int:
+def _seed(seed: int | None) -> int | None:
     if seed is not None and not 0 <= seed < 2**32:
         raise LabError(f"seed {seed}: takes a whole number from 0 to {2**32 - 1}")
-    return seed or 0
+    return seed
 
 
 def _pair(text: str) -> tuple[str, str]:

@@ -19,7 +19,7 @@ class Guard:
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self._app = app
-        self._limit = settings.max_body_bytes
+        self._limits = settings.max_body_bytes, settings.max_solution_bytes
         self._origins = set(settings.origins)
         self._hosts = LOOPBACK if settings.host in LOOPBACK else None
 
@@ -30,7 +30,7 @@ class Guard:
         headers = {k.decode("latin-1"): v.decode("latin-1") for k, v in scope["headers"]}
         refusal = self._refusal(scope, headers)
         if refusal is None:
-            await self._app(scope, _bounded(receive, self._limit), send)
+            await self._app(scope, _bounded(receive, self._limit(scope)), send)
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008, "reason": refusal[1][:120]})
         else:
@@ -47,9 +47,15 @@ class Guard:
         if origin and changes and not self._allowed(origin, host):
             return 403, f"pages of {origin[:80]!r} may not use this server", "wrong-origin"
         length = headers.get("content-length", "0")
-        if not length.isdigit() or int(length) > self._limit:
-            return 413, _too_large(self._limit), "too-large"
+        if not length.isdigit() or int(length) > self._limit(scope):
+            return 413, _too_large(self._limit(scope)), "too-large"
         return None
+
+    def _limit(self, scope: Scope) -> int:
+        """[bytes] Of a body: a solution may be larger than all else."""
+        usual, solution = self._limits
+        is_solution = scope.get("method") == "PUT" and scope["path"].endswith("/solution")
+        return solution if is_solution else usual
 
     def _allowed(self, origin: str, host: str) -> bool:
         return origin in self._origins or urlsplit(origin).netloc == host

@@ -95,10 +95,42 @@ class SetView(Message):
     view: View
 
 
-Command = Annotated[
-    Run | Pause | Step | Reset | Speed | Seed | Apply | Press | SetView,
-    Field(discriminator="command"),
-]
+class SolverRun(Message):
+    """Let the solver run."""
+
+    command: Literal["solver_run"]
+
+
+class SolverPause(Message):
+    """Hold the solver. The world runs on; and holding the world does not hold the solver."""
+
+    command: Literal["solver_pause"]
+
+
+class SolverStep(Message):
+    """Pause the solver, and let it do some iterations."""
+
+    command: Literal["solver_step"]
+    count: Annotated[int, Field(ge=1, le=1000)] = 1
+
+
+class SolverShow(Message):
+    """Pause the solver, and look back at an iteration: the nearest kept one not after it."""
+
+    command: Literal["solver_show"]
+    iteration: Annotated[int, Field(ge=0, le=2**53)]
+
+
+class SolverPace(Message):
+    """Iterations per second at most; 0 for as many as go. It changes no result."""
+
+    command: Literal["solver_pace"]
+    pace: Annotated[Finite, Field(ge=0.0, le=1000.0)]
+
+
+WorldCommand = Run | Pause | Step | Reset | Speed | Seed | Apply | Press | SetView
+SolverCommand = SolverRun | SolverPause | SolverStep | SolverShow | SolverPace
+Command = Annotated[WorldCommand | SolverCommand, Field(discriminator="command")]
 
 
 class SessionInfo(Message):
@@ -138,6 +170,8 @@ class Health(Message):
     sessions: int
     workers: int
     spares: int
+    preparing: bool
+    """Whether the first worker is still awaited, while all is loaded and compiled."""
 
 
 class Problem(Message):
@@ -168,8 +202,31 @@ class Telemetry(Message):
     run: int
     """Counts restarts: rows of another run are another curve."""
     rows: list[list[float | None]]
+    now: list[float | None] | None = None
+    """The state as it is, where it changed since the last sample without time going on."""
     fields: dict[str, Any] | None = None
     """Arrays for curves, heat maps, matrices and bars, a few times a second."""
+
+
+class SolverStatus(Message):
+    """How the solver stands."""
+
+    iteration: int
+    """What is shown; 0 before the first."""
+    latest: int
+    """How far the solver has come."""
+    kept: tuple[int, int] | None
+    """The first and the last iteration one can look at; null before the first."""
+    running: bool
+    """Whether it may run. One that is done has nothing left to do."""
+    pace: float
+    """Iterations per second at most; 0: as many as go."""
+    done: str
+    """Why it stopped, in a sentence; empty while it has iterations left."""
+    progress: float | None
+    """The part done, in [0, 1], where it is known."""
+    seconds_left: float | None
+    """Wall-clock time it will still run, as far as its progress tells."""
 
 
 class Status(Message):
@@ -190,8 +247,8 @@ class Status(Message):
     """The machine is too slow for the chosen speed: simulated time slows down."""
     trouble: str
     """Why the world stopped, in a sentence; empty while all is well."""
-    solver: str
-    """How the solver stands; empty where there is none."""
+    solver: SolverStatus | None
+    """Null where there is none."""
     view: View
 
 

@@ -18,12 +18,21 @@ COLORS: dict[Color, tuple[int, int, int]] = {
     "warning": (220, 38, 38),
     "muted": (140, 152, 168),
 }
+LIGHT, DARK = (255, 255, 255), (26, 27, 30)
+"""What Viser draws behind everything."""
 AMBER = (245, 166, 35)
 GHOST_OPACITY = 0.3
 GHOST_SCALE = 0.95
 """A ghost is a little thinner: where the arm is on its reference, it hides the ghost."""
 STILL = 2e-5
 """A pose entry that moved less [m, or of a unit quaternion] is not sent again."""
+
+
+def paler(color: Color, strength: float, dark: bool) -> np.ndarray:
+    """(3,) a colour mixed towards what is behind it: lines cannot be translucent."""
+    behind = np.array(DARK if dark else LIGHT)
+    mixed: np.ndarray = behind + strength * (np.array(COLORS[color]) - behind)
+    return np.round(mixed).astype(np.uint8)
 
 
 class Node:

@@ -4,6 +4,7 @@ One message in, one out, and no queue in between: a viewer that reads slowly slo
 stream it reads, and Viser merges what waits there."""
 
 import asyncio
+import contextlib
 import gzip
 from functools import cache
 from importlib.util import find_spec
@@ -21,6 +22,8 @@ from server.sessions import NoSession, Sessions
 router = APIRouter(include_in_schema=False)
 
 GONE, TRY_AGAIN = 4404, 1013
+CLOSE_SECONDS = 0.5
+"""A worker, which may be busy or gone, is not waited for longer: nobody is at that end."""
 STYLE = b'<link rel="stylesheet" href="/static/css/scene.css">'
 
 
@@ -71,13 +74,17 @@ async def scene_socket(socket: WebSocket, session_id: str) -> None:
             max_size=None,
             max_queue=4,
             compression=None,
+            close_timeout=CLOSE_SECONDS,
             ping_interval=None,
             proxy=None,
         ) as upstream:
             await socket.accept(offered[0])
             await _relay(socket, upstream)
     except (OSError, websockets.InvalidHandshake):
-        await socket.close(TRY_AGAIN)
+        with contextlib.suppress(WebSocketDisconnect):  # the browser may have left as well
+            await socket.close(TRY_AGAIN)
+    except asyncio.CancelledError:
+        pass  # The server stops and waits no longer; what was open is closed.
 
 
 async def _relay(socket: WebSocket, upstream: ClientConnection) -> None:

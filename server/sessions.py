@@ -78,6 +78,7 @@ class Session:
             "view": new.view.model_dump(),
             "running": True,
             "speed": 1.0,
+            "solver": None,
         }
         self._kept: dict[int, bytes] = {}
         self._crashes: deque[float] = deque(maxlen=CRASHES)
@@ -122,10 +123,16 @@ class Session:
         except WorkerGone:
             raise self._not_now() from None
 
-    async def write(self, form: str, path: str) -> None:
-        """Writes the recording to a file. Raises LabError, NotNow."""
+    async def load(self, path: str) -> dict[str, Any]:
+        """Takes up a solution from a file; answers all parameters. Raises LabError, NotNow."""
+        params: dict[str, Any] = await self.ask("load", path=path)
+        self._latest["params"] = params
+        return params
+
+    async def write(self, what: str, form: str, path: str) -> None:
+        """Writes the recording ("export") or the solution to a file. Raises LabError, NotNow."""
         try:
-            await self._present().ask_for_file(form, path)
+            await self._present().ask_for_file(what, form, path)
         except WorkerGone:
             raise self._not_now() from None
 
@@ -223,6 +230,9 @@ class Sessions:
         except WorkerGone as error:
             self._forget(session, "failed", str(error))
             raise NotNow(f"the lab could not be opened ({error}): try again") from None
+        if session.id not in self._sessions:
+            self._forget(session, "ended", "")
+            raise NotNow("the session was closed before it opened: open the lab anew")
         self._watch(session)
         return session
 
@@ -290,7 +300,9 @@ class Sessions:
             await asyncio.sleep(min(1.0, settings.viewerless_seconds / 2))
             now = asyncio.get_running_loop().time()
             for session in tuple(self._sessions.values()):
-                if not session.viewers and now - session.watched > settings.viewerless_seconds:
+                if session.state == "starting":
+                    session.watched = now  # its first worker may take a minute
+                elif not session.viewers and now - session.watched > settings.viewerless_seconds:
                     self._forget(session, "ended", "Nobody was watching.")
                 elif now - session.touched > settings.untouched_seconds:
                     minutes = settings.untouched_seconds / 60

@@ -27,5 +27,7 @@ class Settings(BaseSettings):
     """A worker silent for this long is taken for hung, and replaced."""
     max_body_bytes: Annotated[int, Field(ge=1024)] = 65536
     """A larger request body is refused."""
+    max_solution_bytes: Annotated[int, Field(ge=1024, le=2**28)] = 2**25
+    """A larger file of a solution is refused."""
     origins: tuple[str, ...] = ()
     """Further origins (scheme://host:port) whose pages may connect, beside the server's own."""

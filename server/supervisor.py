@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import signal
 import socket
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -60,11 +61,14 @@ class Worker:
         does not answer in time."""
         return await self._answer(do, self._expect(), arguments)
 
-    async def ask_for_file(self, form: str, path: str) -> None:
-        """Waits until the worker has written its recording."""
+    async def ask_for_file(self, do: str, form: str, path: str) -> None:
+        """Waits until the worker has written an export or a solution. Raises as `ask` does."""
         done = self._expect()
-        await self.ask("export", form=form, path=path, done=done)
-        await self._await(done)
+        try:
+            await self.ask(do, form=form, path=path, done=done)
+            await self._await(done)
+        finally:
+            self._answers.pop(done, None)
 
     @property
     def silence(self) -> float:
@@ -152,6 +156,8 @@ class Supervisor:
         self._workers: set[Worker] = set()
         self._tasks = Tasks()
         self._filling = asyncio.Lock()
+        self.preparing = True
+        """Whether the first worker is still awaited, while all is loaded and compiled."""
 
     @property
     def count(self) -> int:
@@ -193,7 +199,9 @@ class Supervisor:
             target=worker_entry.main, args=(theirs,), daemon=True, name="orclab-worker"
         )
         try:
-            await asyncio.to_thread(process.start)
+            # The first waits here until the fork server has prepared what all workers share. That
+            # may take a minute, where solvers are to be compiled; nobody is late yet.
+            await _on_a_thread(process.start)
         except (EOFError, OSError) as error:
             ours.close()
             raise WorkerGone(f"no process could be started ({error!r})") from None
@@ -206,6 +214,7 @@ class Supervisor:
         except (WorkerGone, TimeoutError) as error:
             await self.release(worker, "it did not start")
             raise WorkerGone(f"a worker did not start: {error}") from None
+        self.preparing = False
         return worker
 
     async def _fill(self) -> None:
@@ -226,6 +235,32 @@ class Supervisor:
                     seconds = self._settings.hang_seconds
                     reason = f"it stopped answering for {seconds:g} s and was ended"
                     self._tasks.do(self.release(worker, reason))
+
+
+async def _on_a_thread(work: Callable[[], None]) -> None:
+    """As `asyncio.to_thread`, but the end of the server does not wait for it."""
+    loop = asyncio.get_running_loop()
+    done: asyncio.Future[None] = loop.create_future()
+
+    def tell(error: BaseException | None) -> None:
+        if done.done():
+            return
+        if error:
+            done.set_exception(error)
+        else:
+            done.set_result(None)
+
+    def run() -> None:
+        error: BaseException | None = None
+        try:
+            work()
+        except BaseException as problem:
+            error = problem
+        with contextlib.suppress(RuntimeError):  # the loop has ended: nobody waits any more
+            loop.call_soon_threadsafe(tell, error)
+
+    threading.Thread(target=run, daemon=True).start()
+    await done
 
 
 def _obituary(exitcode: int | None) -> str:

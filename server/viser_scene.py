@@ -20,7 +20,7 @@ from server import meshes
 from server.boards import CellsNode, SurfaceNode
 from server.mailbox import Mailbox
 from server.messages import View
-from server.nodes import COLORS, ArmNode, Node
+from server.nodes import COLORS, ArmNode, Node, paler
 
 TRAIL_EVERY = 3
 """Frames between two updates of a trail or of many arrows: they are long messages."""
@@ -107,19 +107,23 @@ class ViserScene:
         if effort is not None:
             node.rings(effort)
 
-    def trail(self, name: str, points: np.ndarray, color: Color = "actual") -> None:
+    def trail(
+        self, name: str, points: np.ndarray, color: Color = "actual", strength: float = 1.0
+    ) -> None:
         if len(points) < 2:
             return
         segments = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
+        mixed = paler(color, strength, self._view.dark)
 
         def make() -> Node:
             return Node(
                 self._server.scene.add_line_segments(
-                    f"/{name}", segments, COLORS[color], thickness=2.5, thickness_units="screen"
+                    f"/{name}", segments, mixed, thickness=2.5, thickness_units="screen"
                 )
             )
 
-        node = self._node(name, color, make)
+        node = self._node(name, "trail", make)
+        node.send("colors", mixed)
         if self._frame % TRAIL_EVERY == 0:
             node.send("points", segments)
 

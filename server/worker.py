@@ -5,31 +5,32 @@ Simulated time follows the wall clock at the chosen speed. When the machine is t
 behind, and says so; what is computed never depends on the wall clock."""
 
 import contextlib
-import ctypes
 import functools
 import logging
 import os
 import signal
 import socket
-import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import viser
-import websockets.asyncio.server
 
 from labs.catalog import find
 from labs.errors import LabError
 from labs.plots import pictured
 from labs.run import World
+from labs.solution import Solution
 from server.mailbox import Item, Mailbox
 from server.messages import Hello, Status, Telemetry, View
 from server.panel import Panel
 from server.pipe import CONTROL, HELLO, STATUS, STREAM, Link
+from server.process import die_with_parent, viser_server
+from server.solver_clock import SolverClock
 from server.viser_scene import ViserScene
 
 FRAME = 1 / 60
@@ -39,6 +40,8 @@ LATE = 0.001
 TELEMETRY = 1 / 30
 FIELDS = 1 / 5
 STATUS_EVERY = 0.5
+SOLVER_EVERY = 0.1
+"""[s] As long as the solver comes on, its status is told as often."""
 SLIP = 0.2
 """[s] Wall-clock time the simulation may lag and still catch up; what is beyond is given up."""
 
@@ -47,11 +50,11 @@ log = logging.getLogger("orclab.worker")
 
 def main(sock: socket.socket) -> None:
     """Runs until the web process closes the pipe."""
-    _die_with_parent()
+    die_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     link, mailbox = Link(sock), Mailbox()
     threading.Thread(target=_listen, args=(link, mailbox), daemon=True).start()
-    server = _viser()
+    server = viser_server()
     try:
         link.send(CONTROL, {"ready": True, "port": server.get_port()})
         opening = _wait_for_opening(link, mailbox)
@@ -74,14 +77,17 @@ class Live:
         self.viewers = 0
         self.failure = ""
         self._fields = sorted({name for plot in self.world.lab.plots for name in pictured(plot)})
+        self.solver = SolverClock(self.world, opening["solver"])
         self.scene = ViserScene(server, mailbox, self.view)
         self.panel = Panel(server, mailbox, self.world)
         self._sent_run = 0
         self._sent_rows = 0
+        self._measured: tuple[Any, Any] = (self.world.state, self.world.params)
         self._due = dict.fromkeys(("scene", "telemetry", "fields", "status"), 0.0)
         self._pace: deque[tuple[float, float]] = deque(maxlen=4)
         self._urgent = False
         self._lateness = 0.0
+        self._told, self._told_of = 0.0, self.world.shown
         self._anchor()
 
     def loop(self) -> None:
@@ -103,7 +109,10 @@ class Live:
         error = ""
         answer: Any = None
         try:
-            answer = getattr(self, f"_do_{item.do}")(**item.arguments)
+            if item.do.startswith("solver_"):
+                self.solver.obey(item.do.removeprefix("solver_"), **item.arguments)
+            else:
+                answer = getattr(self, f"_do_{item.do}")(**item.arguments)
         except LabError as refused:
             error = str(refused)
             self.panel.show(self.world.params)  # puts a refused value back
@@ -128,6 +137,8 @@ class Live:
         if restart:
             self._do_reset()
             self._do_run()
+            if self.world.lab.has_solver():
+                self.solver.obey("run")
         return answer
 
     def _do_run(self) -> None:
@@ -163,6 +174,14 @@ class Live:
         self.world.hold(handle, point)
         self._changed(restarted=self.world.runs != runs)
 
+    def _do_load(self, path: str) -> dict[str, Any]:
+        """Takes up a saved solution; the solver waits then."""
+        self.world.load(Solution.read(Path(path).read_bytes()))
+        self.failure = ""
+        self.solver.obey("pause")
+        self._changed(restarted=True)
+        return self.world.params.model_dump()
+
     def _do_view(self, view: dict[str, Any]) -> None:
         self.view = View(**view)
         self.scene.set_view(self.view)
@@ -176,15 +195,20 @@ class Live:
         return self.world.command()
 
     def _do_export(self, form: str, path: str, done: int) -> None:
-        """Writes the recording to `path`, on a thread of its own, and then answers `done`."""
-        recording = self.world.recording()
+        self._write(functools.partial(self.world.recording().write, form), path, done)
+
+    def _do_solution(self, form: str, path: str, done: int) -> None:
+        self._write(functools.partial(self.world.solution().write, form), path, done)
+
+    def _write(self, content: Callable[[], bytes], path: str, done: int) -> None:
+        """Writes to `path`, on a thread of its own, and then answers `done`."""
 
         def write() -> None:
             try:
-                Path(path).write_bytes(recording.write(form))
+                Path(path).write_bytes(content())
                 error = ""
             except OSError as problem:
-                error = f"the recording could not be written: {problem}"
+                error = f"the file could not be written: {problem}"
             self.link.send(CONTROL, {"ref": done, "answer": None, "error": error})
 
         threading.Thread(target=write, daemon=True).start()
@@ -239,11 +263,8 @@ class Live:
             self._wall0 += lag - SLIP
 
     def _iterate(self, now: float) -> None:
-        if not self.world.solving or self.failure:
-            return
-        self.world.iterate()
-        while self.world.solving and time.perf_counter() - now < 0.8 * FRAME:
-            self.world.iterate()
+        if not self.failure:
+            self.solver.iterate(now, until=now + 0.8 * FRAME)
 
     # The viewers --------------------------------------------------------------------------------
 
@@ -264,6 +285,8 @@ class Live:
         if self._beat("scene", now, frame) and not self.failure:
             with self._guard():
                 self.scene.draw(self.world)
+        if self.world.shown is not self._told_of:
+            self._due["status"] = min(self._due["status"], self._told + SOLVER_EVERY)
         if self._beat("status", now, STATUS_EVERY):
             self._status(now)
 
@@ -286,13 +309,26 @@ class Live:
             lab, params, state = self.world.lab, self.world.params, self.world.state
             found = {**lab.fields(params, state), **lab.notes(params, state)}
             fields = {name: found[name] for name in self._fields if name in found}
-        if self.viewers and (len(rows) or fields):
+        now_row = None if len(rows) else self._unrecorded()
+        if len(rows):
+            self._measured = self.world.state, self.world.params
+        if self.viewers and (len(rows) or fields or now_row is not None):
             message = Telemetry.model_construct(type="telemetry", run=self.world.runs, rows=rows)
             # float32 halves the text; a plot has no use for more digits.
             self.link.send(
                 STREAM,
-                vars(message) | {"rows": rows.astype("float32"), "fields": fields},
+                vars(message) | {"rows": rows.astype("float32"), "fields": fields, "now": now_row},
             )
+
+    def _unrecorded(self) -> np.ndarray | None:
+        """What a solver or a parameter has changed while the world stands still; once."""
+        state, params = self.world.state, self.world.params
+        known = state is self._measured[0] and params is self._measured[1]
+        if known or not self.viewers or self.failure:
+            return None
+        self._measured = state, params
+        measured = self.world.lab.measure(self.world.params, self.world.state)
+        return self.world.recorder.row(self.world.t, measured).astype("float32")
 
     def _status(self, now: float) -> None:
         if not self._pace or now - self._pace[-1][0] > 0.9 * STATUS_EVERY:
@@ -300,7 +336,6 @@ class Live:
         (w0, t0), (w1, t1) = self._pace[0], self._pace[-1]
         factor = (t1 - t0) / (w1 - w0) if w1 > w0 else self.speed
         measuring = self._moving and w1 - w0 >= 2 * STATUS_EVERY
-        solution = self.world.solution
         status = Status(
             run=self.world.runs,
             t=self.world.t,
@@ -312,10 +347,11 @@ class Live:
             step_seconds=self._spent / self._taken if self._taken else 0.0,
             capped=measuring and factor < 0.95 * self.speed,
             trouble=self.failure or self.world.trouble,
-            solver="" if solution is None else solution.done or f"iteration {solution.iteration}",
+            solver=self.solver.status(),
             view=self.view,
         )
         self.link.send(STATUS, status.model_dump())
+        self._told, self._told_of = now, self.world.shown
         self._spent, self._taken = 0.0, 0
 
     # When the lab itself breaks -----------------------------------------------------------------
@@ -354,20 +390,3 @@ def _wait_for_opening(link: Link, mailbox: Mailbox) -> dict[str, Any]:
     for item in items[1:]:
         mailbox.put(item.do, item.ref, **item.arguments)
     return opening.arguments
-
-
-def _viser() -> viser.ViserServer:
-    """A Viser server on a free loopback port that no web page can reach past the proxy: browsers
-    always send an Origin, the proxy never does."""
-    websockets.asyncio.server.serve = functools.partial(  # type: ignore[assignment,misc]
-        websockets.asyncio.server.serve, origins=[None]
-    )
-    with Path(os.devnull).open("w") as silence, contextlib.redirect_stdout(silence):
-        return viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-
-
-def _die_with_parent() -> None:
-    """On Linux the kernel ends a worker whose parent dies, even one stuck in native code.
-    Elsewhere the closing pipe does."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG

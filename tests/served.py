@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from typing import Any, Self
+from typing import IO, Any, Self
 
 import httpx
 import psutil
@@ -19,17 +19,21 @@ from websockets.sync.connection import Connection
 class Served:
     """`with Served(ORCLAB_SPARES="0") as server: server.http.get("/")`."""
 
-    def __init__(self, port: int = 0, **environment: str) -> None:
+    def __init__(
+        self, port: int = 0, wait: bool = True, stderr: IO[str] | None = None, **environment: str
+    ) -> None:
+        """`wait`: until a spare is warm. `stderr`: where its complaints go."""
         self._environment = os.environ | {"ORCLAB_LABS": "tests.sample_labs"} | environment
-        self._port = port
-        self.start()
+        self._port, self._stderr = port, stderr
+        self.start(wait)
 
-    def start(self) -> None:
+    def start(self, wait: bool = True) -> None:
         """Starts, and waits until it answers and a spare is warm."""
         self.process = subprocess.Popen(
             [sys.executable, "-m", "server", "--port", str(self._port)],
             env=self._environment,
             stdout=subprocess.PIPE,
+            stderr=self._stderr,
             text=True,
         )
         assert self.process.stdout is not None
@@ -39,7 +43,8 @@ class Served:
         self._port = int(self.address.rsplit(":", 1)[1])
         self.http = httpx.Client(base_url=self.address, timeout=60)
         spares = int(self._environment.get("ORCLAB_SPARES", "1"))
-        until(lambda: self.health()["spares"] >= spares)
+        # A fresh checkout compiles the solvers first.
+        until(lambda: not wait or self.health()["spares"] >= spares, seconds=240)
 
     def __enter__(self) -> Self:
         return self

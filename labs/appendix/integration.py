@@ -321,24 +321,29 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
         )
 
     def solve(self, params: IntegrationParams, state: IntegrationState) -> Iterator[Snapshot]:
-        """One method an iteration: its errors for every step of LADDER, and its limit."""
+        """One method an iteration: its errors for every step of LADDER, and its limit. What was
+        found for other parameters stands until it is replaced."""
+        found = {
+            "global_errors": state.global_errors,
+            "local_errors": state.local_errors,
+            "costs": state.costs,
+            "limits": state.limits,
+        }
         for i, name in enumerate(NAMES):
             errors, local, costs, limit = errors_and_limit(*_key(name, params), params.start)
-            found = {"method": i, "global": errors, "local": local, "cost": costs, "limit": limit}
+            found = {
+                "global_errors": _with(found["global_errors"], i, errors),
+                "local_errors": _with(found["local_errors"], i, local),
+                "costs": _with(found["costs"], i, costs),
+                "limits": _with(found["limits"], i, limit),
+            }
             done = "All methods studied." if i == len(NAMES) - 1 else ""
-            yield Snapshot(i + 1, found, done)
+            yield Snapshot(i + 1, found, done, (i + 1) / len(NAMES))
 
     def accept(
         self, params: IntegrationParams, state: IntegrationState, snapshot: Snapshot
     ) -> IntegrationState:
-        data, i = snapshot.data, snapshot.data["method"]
-        return replace(
-            state,
-            global_errors=_with(state.global_errors, i, data["global"]),
-            local_errors=_with(state.local_errors, i, data["local"]),
-            costs=_with(state.costs, i, data["cost"]),
-            limits=_with(state.limits, i, data["limit"]),
-        )
+        return replace(state, **snapshot.data)
 
     def measure(self, params: IntegrationParams, state: IntegrationState) -> Measurement:
         plant, own = params.plant, tableau_of(params.tableau)

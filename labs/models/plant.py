@@ -76,9 +76,15 @@ class Plant:
 def plant(robot: str, payload: float = 0.0) -> Plant:
     """The arm of this name carrying `payload` [kg] at its end-effector."""
     arm = load(robot)
+    model = laden(arm, payload)
+    return Plant(arm, model, model.createData())
+
+
+def laden(arm: Arm, payload: float) -> pin.Model:
+    """The arm's model with a point mass [kg] at its end-effector."""
     model = arm.model.copy()
     if payload > 0.0:
         frame = model.frames[arm.tip]
         mass = pin.Inertia(payload, np.zeros(3), np.zeros((3, 3)))
         model.appendBodyToJoint(frame.parentJoint, mass, frame.placement)
-    return Plant(arm, model, model.createData())
+    return model

@@ -3,6 +3,8 @@
 const KEYS = {
   " ": "toggle",
   ".": "step",
+  o: "solve",
+  i: "iterate",
   r: "reset",
   d: "defaults",
   "+": "faster",
@@ -27,7 +29,7 @@ export function wireKeyboard(actions) {
     const digit = /^[1-9]$/.test(event.key) ? Number(event.key) : 0;
     const name = KEYS[event.key.toLowerCase()];
     if (!digit && !name) return;
-    if (event.repeat && name !== "step") return;
+    if (event.repeat && name !== "step" && name !== "iterate") return;
     event.preventDefault();
     if (digit) actions.experiment(digit - 1);
     else actions[name]();

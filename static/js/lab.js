@@ -9,6 +9,7 @@ import { wireMenus } from "./menus.js";
 import { Board } from "./plots/board.js";
 import { onViewChange, view, wirePreferences } from "./preferences.js";
 import { Session } from "./session.js";
+import { SolverRow } from "./solver.js";
 import { Stage } from "./stage.js";
 import { wireTips } from "./tips.js";
 import { toast } from "./toast.js";
@@ -19,6 +20,7 @@ const session = new Session(lab, document.getElementById("robot"), readLink(lab.
 const stage = new Stage();
 const board = new Board(lab);
 const transport = new Transport(send);
+const solver = new SolverRow(send, loadSolution);
 const knobs = new Knobs(lab, (changes) => session.change(changes));
 const experiments = new Experiments(lab, apply, (text) => board.watch(text));
 let link = location.href;
@@ -41,8 +43,12 @@ function apply(params) {
 }
 
 const actions = {
-  toggle: () => transport.toggle(),
-  step: () => send({ command: "step", count: 1 }),
+  // A solver without a world has the keys of the world's clock.
+  toggle: () => (lab.has_world ? transport : solver).toggle(),
+  step: () => (lab.has_world ? send({ command: "step", count: 1 }) : solver.step()),
+  solve: () => solver.toggle(),
+  iterate: () => solver.step(),
+  loadSolution: () => solver.choose(),
   reset: () => send({ command: "reset" }),
   defaults: () => apply({}),
   faster: () => transport.faster(1),
@@ -77,12 +83,27 @@ function fullScreen() {
   else document.getElementById("view").requestFullscreen?.();
 }
 
-function download(kind) {
+function download(what) {
   if (!session.info) return;
   const anchor = document.createElement("a");
-  anchor.href = `/api/sessions/${session.info.id}/export.${kind}`;
+  anchor.href = `/api/sessions/${session.info.id}/${what}`;
   anchor.download = "";
   anchor.click();
+}
+
+function saveSolution(form) {
+  if (solver.status?.kept) download(`solution.${form}`);
+  else toast("The solver has found nothing yet that could be saved.");
+}
+
+async function loadSolution(file) {
+  try {
+    fresh = performance.now();
+    await session.load(file);
+    toast("Solution loaded, with its parameters. The solver waits: run it to go on from there.");
+  } catch (error) {
+    toast(`${file.name} was not loaded: ${error.message.replace(/\.?$/, ".")}`, 15);
+  }
 }
 
 // What the session tells ----------------------------------------------------------------------
@@ -91,6 +112,7 @@ session.addEventListener("phase", ({ detail: { phase, text } }) => {
   const retry = { "Try now": () => session.create(session.news) };
   const live = phase === "live";
   transport.enable(live);
+  solver.enable(live);
   for (const button of document.querySelectorAll(".try")) button.disabled = !live;
   if (["worker", "robot", "live"].includes(phase)) {
     stage.progress(phase);
@@ -103,6 +125,8 @@ session.addEventListener("phase", ({ detail: { phase, text } }) => {
     stage.say(text + more, { warn: true, buttons });
   }
 });
+
+session.addEventListener("preparing", () => stage.prepare());
 
 session.addEventListener("refused", ({ detail }) => {
   const sentence = detail.replace(/\.?$/, ".");
@@ -118,6 +142,7 @@ session.addEventListener("telemetry", ({ detail }) => {
 
 session.addEventListener("status", ({ detail: status }) => {
   transport.show(status);
+  solver.show(status.solver);
   if (!fresh && differs(knobs.values, status.params)) experiments.leave();
   if (fresh && performance.now() - fresh > 1000) fresh = null;
   knobs.show(status.params);
@@ -156,7 +181,10 @@ for (const button of document.querySelectorAll("[data-preset]")) {
   button.addEventListener("click", () => apply(lab.presets[button.dataset.preset]));
 }
 for (const button of document.querySelectorAll("[data-export]")) {
-  button.addEventListener("click", () => download(button.dataset.export));
+  button.addEventListener("click", () => download(`export.${button.dataset.export}`));
+}
+for (const button of document.querySelectorAll("[data-solution]")) {
+  button.addEventListener("click", () => saveSolution(button.dataset.solution));
 }
 onViewChange((wanted) => {
   board.retheme();

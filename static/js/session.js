@@ -1,11 +1,12 @@
 // One live session of a lab, from this page's side: creates it, listens to its stream, and brings
 // it back with the same parameters when the connection, the worker or the whole server was lost.
 //
-// Events: "phase" {phase, text}, "hello", "telemetry", "status", "notice", "refused" (a sentence).
+// Events: "phase" {phase, text}, "preparing", "hello", "telemetry", "status", "notice", "refused" (a sentence).
 // Phases: worker, robot, live, lost, full, failed, ended.
 
 const BACKOFF = [500, 1000, 2000, 3500, 5000]; // [ms]
 const FULL_RETRY = 10000;
+const PATIENCE = 3000; // What takes longer is explained.
 const SILENCE = 8000; // A live stream speaks twice a second; after this it is taken for dead.
 
 export class Session extends EventTarget {
@@ -14,7 +15,7 @@ export class Session extends EventTarget {
     this.lab = lab;
     this.frame = frame;
     this.view = view; // a function: what the scene should look like now
-    this.want = { params, seed, speed: 1, running: null };
+    this.want = { params, seed, speed: 1, running: null, solver: null };
     this.info = null;
     this.socket = null;
     this.tries = 0;
@@ -41,9 +42,11 @@ export class Session extends EventTarget {
     this.news = news;
     this.tell("phase", { phase: "worker", text: news });
     const { params, seed } = this.want;
+    const waiting = setInterval(() => this.tellPreparing(), PATIENCE);
     const { status, data } = await request("POST", "/api/sessions", {
       lab: this.lab.slug, params, seed, view: this.view(),
     });
+    clearInterval(waiting);
     if (this.closed) return;
     if (status === 201) return this.begin(data);
     if (status === 503) {
@@ -59,6 +62,12 @@ export class Session extends EventTarget {
     } else {
       this.tell("phase", { phase: "failed", text: data.error });
     }
+  }
+
+  // A server started for the first time has more to do than to start a worker.
+  async tellPreparing() {
+    const { data } = await request("GET", "/healthz");
+    if (data.preparing && !this.info && !this.closed) this.tell("preparing");
   }
 
   begin(info) {
@@ -100,15 +109,18 @@ export class Session extends EventTarget {
     if (this.restore) {
       // A session that takes over from a lost one goes on as that one did.
       this.restore = false;
-      const { speed: factor, running } = this.want;
+      const { speed: factor, running, solver } = this.want;
       const commands = [];
       if (factor !== speed) commands.push({ command: "speed", factor });
       if (running === false && status.running) commands.push({ command: "pause" });
       if (running && !status.running && !status.trouble) commands.push({ command: "run" });
+      if (solver && !solver.running) commands.push({ command: "solver_pause" });
+      if (solver?.pace) commands.push({ command: "solver_pace", pace: solver.pace });
       // One that fails is no harm: the page shows what the server does.
       for (const command of commands) this.send(command).catch(() => {});
     } else {
-      this.want = { params, seed, speed, running: status.running || status.trouble !== "" };
+      const running = status.running || status.trouble !== "";
+      this.want = { params, seed, speed, running, solver: status.solver };
     }
     this.tries = 0;
     this.told = true;
@@ -197,6 +209,11 @@ export class Session extends EventTarget {
     return this.ask("PATCH", "params", changes);
   }
 
+  // A saved solution, as the file it is.
+  load(file) {
+    return this.ask("PUT", "solution", file);
+  }
+
   async ask(method, what, body) {
     if (!this.info) throw new Error("The simulation is not ready yet.");
     const { status, data } = await request(method, `/api/sessions/${this.info.id}/${what}`, body);
@@ -212,11 +229,12 @@ export class Session extends EventTarget {
 
 // Status 0 stands for a server that could not be reached.
 async function request(method, address, body) {
+  const asIs = body === undefined || body instanceof Blob;
   try {
     const response = await fetch(address, {
       method,
-      headers: body === undefined ? {} : { "Content-Type": "application/json" },
-      body: body === undefined ? undefined : JSON.stringify(body),
+      headers: asIs ? {} : { "Content-Type": "application/json" },
+      body: asIs ? body : JSON.stringify(body),
     });
     const data = await response.json().catch(() => ({}));
     return { status: response.status, data: { error: `The server answered ${response.status}.`, ...data } };

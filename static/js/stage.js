@@ -17,7 +17,13 @@ export class Stage {
       step.className = i < at || phase === "live" ? "done" : i === at ? "now" : "";
     });
     this.curtain.classList.toggle("open", phase === "live");
+    this.curtain.querySelector(".once").hidden = true;
     this.hold(false);
+  }
+
+  // The first start takes longer than any other.
+  prepare() {
+    this.curtain.querySelector(".once").hidden = false;
   }
 
   // The start has to wait: nothing turns that is not under way.

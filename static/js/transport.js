@@ -13,7 +13,6 @@ export class Transport {
     this.speed = document.getElementById("speed");
     this.speedValue = document.getElementById("speed-value");
     this.seed = document.getElementById("seed");
-    this.solver = document.getElementById("solver");
     this.speed?.addEventListener("input", () => this.slide());
     this.speed?.addEventListener("dblclick", () => this.setSpeed(1));
     this.seed.addEventListener("change", () => this.setSeed());
@@ -66,12 +65,10 @@ export class Transport {
     const before = this.status;
     this.status = status;
     if (document.activeElement !== this.seed && before?.seed !== status.seed) this.seed.value = status.seed;
-    if (this.solver) this.solver.textContent = status.solver;
     if (!this.run) return;
     const running = status.running && !status.trouble;
     this.run.setAttribute("aria-pressed", String(running));
     this.run.querySelector("span").textContent = running ? "Pause" : "Run";
-    if (!this.speed) return; // a solver without a world has no clock
     this.showTime(status.t);
     this.showPace(status);
     // A thumb in motion is not pulled back by what the server said a moment ago.

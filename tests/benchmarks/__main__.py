@@ -5,17 +5,30 @@ Figures of one run stand side by side; compare ratios, not seconds, across machi
 import argparse
 import platform
 
-from tests.benchmarks import dynamic_programming, headless, latency, load, td_control
+from tests.benchmarks import (
+    ddp,
+    dynamic_programming,
+    headless,
+    latency,
+    load,
+    lqr,
+    resolve,
+    td_control,
+)
 
 MEASURES = {
     "headless": headless.ratio_to_bare_calls,
+    "lqr": lqr.riccati,
+    "ddp": ddp.iteration_ratio,
+    "ddp-growth": ddp.growth,
+    "value-iteration": dynamic_programming.on_the_pendulum,
     "q-learning": td_control.q_learning_steps,
     "slider": latency.slider_to_telemetry,
     "scene": latency.slider_to_scene,
+    "resolve": resolve.weight_to_motion,
     "page": latency.page_to_motion,
     "twelve": load.twelve,
     "growing": load.growing,
-    "dynamic-programming": dynamic_programming.on_the_pendulum,
 }
 
 

@@ -3,7 +3,7 @@
 import copy
 import pickle
 from collections.abc import Iterator, Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,8 @@ from labs.params import Choice, Knob, Params, Text, Toggle, Value
 from labs.plots import Bars, Curve, Curves, HeatMap, Matrix, Note, Readout, TimeSeries
 from labs.run import Event, World, run
 from labs.scene import Color
+from labs.snapshots import leaves
+from labs.solution import Solution
 from server.articles import render, tex
 
 SECONDS = 1.0
@@ -95,8 +97,11 @@ class CheckingScene:
             assert np.isfinite(effort).all()
             assert (effort >= 0.0).all()
 
-    def trail(self, name: str, points: np.ndarray, color: Color = "actual") -> None:
+    def trail(
+        self, name: str, points: np.ndarray, color: Color = "actual", strength: float = 1.0
+    ) -> None:
         self._new(name, color)
+        assert 0.0 < strength <= 1.0
         assert points.ndim == 2
         assert points.shape[0] >= 2, "a line has two ends"
         assert points.shape[1] == 3
@@ -356,7 +361,82 @@ def test_names_do_not_collide(entry: Entry) -> None:
     # These are keys beside the channels in exports, commands and on the command line.
     reserved = {"t", "lab", "seed", "trouble", "about"}
     assert not reserved & set(moved(entry).recorder.columns[1:])
-    assert not {"press", "hold", "iterate"} & set(lab.Params.tunables)
+    assert not {"press", "hold", "iterate", "show"} & set(lab.Params.tunables)
+
+
+# The solver -----------------------------------------------------------------------------------
+
+solvers = pytest.mark.parametrize(
+    "entry", [e for e in ENTRIES if e.lab.has_solver()], ids=lambda entry: entry.slug
+)
+LOOKED_AT = 12
+"""Iterations of a solver that are looked at."""
+
+
+def iterated(entry: Entry) -> tuple[World, list[State]]:
+    """A world after some iterations, and the state after each."""
+    world = World(entry)
+    states: list[State] = []
+    while world.solving and len(states) < LOOKED_AT:
+        world.iterate()
+        states.append(copy.deepcopy(replace(world.state, seconds={})))
+    return world, states
+
+
+@solvers
+def test_looking_back_shows_what_was(entry: Entry) -> None:
+    """A snapshot is complete: accepted again, and after later ones, it gives the same state."""
+    world, states = iterated(entry)
+    for i in (*reversed(range(len(states))), 0, len(states) - 1):
+        for _ in range(2):
+            world.show(world.kept.iterations[i])
+            assert same(replace(world.state, seconds={}), states[i]), f"iteration {i + 1}"
+
+
+@solvers
+def test_a_solver_counts_its_iterations_and_says_why_it_ends(entry: Entry) -> None:
+    world, states = iterated(entry)
+    assert world.kept.iterations == list(range(1, len(states) + 1))
+    last = world.latest
+    assert last is not None
+    assert bool(last.done) == (not world.solving)
+    assert last.progress is None or 0.0 <= last.progress <= 1.0
+
+
+@solvers
+def test_a_snapshot_is_plain_deterministic_and_never_written_into(entry: Entry) -> None:
+    """Its durations stand under "seconds" alone; all else is the same each time."""
+    world, _ = iterated(entry)
+    before = [copy.deepcopy(_lasting(world.kept.at(i))) for i in world.kept.iterations]
+    for _ in range(20 if entry.lab.has_world() else 0):
+        world.advance()
+    again, _ = iterated(entry)
+    for i, was in zip(world.kept.iterations, before, strict=True):
+        assert all(np.isfinite(a).all() for a in _arrays(was)), "a snapshot is finite"
+        assert same(_lasting(world.kept.at(i)), was)
+        assert same(_lasting(again.kept.at(i)), was)
+        assert not {"about", "file"} & {name for name, _ in leaves(was)}, "names of the files"
+
+
+@solvers
+@pytest.mark.parametrize("form", ["json", "npz"])
+def test_a_solution_is_saved_and_taken_up_again(entry: Entry, form: str) -> None:
+    world, _ = iterated(entry)
+    world = World(entry, solution=Solution.read(world.solution().write(form)))
+    found, _ = iterated(entry)
+    assert same(replace(world.state, seconds={}), replace(found.state, seconds={}))
+    check(world)
+    assert world.latest is not None
+    assert found.latest is not None
+    assert world.latest.iteration == found.latest.iteration
+    if world.solving:
+        world.iterate()
+        check(world)
+
+
+def _lasting(snapshot: Snapshot | None) -> dict[str, Any]:
+    assert snapshot is not None
+    return {name: value for name, value in snapshot.data.items() if name != "seconds"}
 
 
 # Plots ----------------------------------------------------------------------------------------

@@ -1,5 +1,6 @@
 """Worlds, their events, and running them again (labs/run.py)."""
 
+import contextlib
 import json
 import math
 import shlex
@@ -150,8 +151,8 @@ def test_a_solver_runs_to_the_end_before_time_starts() -> None:
     world = run("oscillator", {"guess": 2.0}, seconds=0.1)
     assert world.recording().channels["root"][1] == pytest.approx(math.sqrt(2.0), rel=1e-12)
     assert not world.solving
-    assert world.solution is not None
-    assert world.solution.done == "converged"
+    assert world.latest is not None
+    assert world.latest.done == "converged"
 
 
 def test_a_solve_change_starts_the_solver_again() -> None:
@@ -189,6 +190,58 @@ def test_a_run_whose_solver_never_started_is_reproduced_too() -> None:
     again = run("oscillator", {"guess": 50.0}, seconds=world.t, events=world.events)
     assert world.state.root == again.state.root == 0.0
     assert same(run_command(world.command()), world)
+
+
+def test_looking_back_shows_what_was_and_the_next_iteration_goes_on_from_the_latest() -> None:
+    world = a_world(guess=50.0)
+    roots = []
+    for _ in range(4):
+        world.iterate()
+        roots.append(world.state.root)
+    world.show(2)
+    assert world.state.root == roots[1]
+    assert world.shown is not world.latest
+    advanced(world, 3)
+    assert world.state.root == roots[1], "time passes, what is shown stays"
+    world.iterate()
+    assert world.latest is world.shown
+    assert world.latest is not None
+    assert world.latest.iteration == 5
+    straight = a_world(guess=50.0)
+    for _ in range(5):
+        straight.iterate()
+    assert world.state.root == straight.state.root
+    assert [(e.step, e.name, e.value) for e in world.events] == [
+        (0, "iterate", 4),
+        (0, "show", 2),
+        (3, "iterate", 1),
+    ]
+
+
+def test_of_looking_around_within_one_step_only_the_last_is_kept() -> None:
+    world = solved(a_world())
+    for k in (5, 3, 1, 2):
+        world.show(k)
+    assert [(e.name, e.value) for e in world.events[1:]] == [("show", 2)]
+
+
+def test_a_solver_started_anew_forgets_what_it_found() -> None:
+    world = solved(a_world())
+    solves = world.solves
+    world.change({"guess": 16.0})
+    assert world.solves == solves + 1
+    assert (len(world.kept), world.shown, world.latest) == (0, None, None)
+    assert world.state.root == pytest.approx(3.0), "until there is something better"
+    world.iterate()
+    assert world.kept.iterations == [1]
+
+
+def test_a_headless_run_looks_back_at_what_it_solved_to_the_end() -> None:
+    world = run("oscillator", seconds=1.0, events=[Event(50, "solve", "show", 2)])
+    root = world.recording().channels["root"]
+    assert root[50] == pytest.approx(3.0, rel=1e-12)
+    assert root[51] == 3.4
+    assert run("oscillator", seconds=0.0, events=[Event(0, "solve", "show", 1)]).state.root == 5.0
 
 
 # Events ---------------------------------------------------------------------------------------
@@ -254,6 +307,8 @@ def _pushed(world: World) -> None:
     world.press("kick")
     world.press("kick")
     advanced(world, 5)
+    world.show(1)
+    advanced(world, 2)
 
 
 def _untouched(world: World) -> None:
@@ -308,6 +363,7 @@ DEEDS = st.lists(
     st.one_of(
         st.tuples(st.just("advance"), st.integers(1, 30)),
         st.tuples(st.just("iterate"), st.integers(1, 4)),
+        st.tuples(st.just("show"), st.integers(0, 9)),
         st.tuples(st.just("omega"), st.floats(0.1, 10.0)),
         st.tuples(st.just("guess"), st.floats(1.0, 100.0)),
         st.tuples(st.just("start"), st.floats(-1.0, 1.0)),
@@ -331,6 +387,9 @@ def test_whatever_is_done_can_be_done_again(deeds: list[tuple[str, Any]], seed: 
             case "iterate":
                 for _ in range(value):
                     world.iterate()
+            case "show":
+                with contextlib.suppress(ParameterError):  # before the first iteration
+                    world.show(value)
             case "press":
                 world.press(value)
             case "hold":
@@ -342,12 +401,14 @@ def test_whatever_is_done_can_be_done_again(deeds: list[tuple[str, Any]], seed: 
     again = run_command(world.command())
     assert same(again, world)
     assert again.solving == world.solving
+    assert again.state.root == world.state.root
     about = json.loads(world.recording().json())
     replayed = run(
         "oscillator", about["params"], seed=seed, seconds=world.t, events=events_of(about)
     )
     assert same(replayed, world)
     assert replayed.solving == world.solving
+    assert replayed.kept.iterations == world.kept.iterations
 
 
 def test_there_and_back_within_a_step_starts_the_solver_again_in_the_replay_too() -> None:
@@ -440,6 +501,7 @@ def test_progress_is_told_from_the_start_on_and_rises() -> None:
         ("4", "hold=pull:0.1,-2,3e-1", Event(400, "hold", "pull", (0.1, -2.0, 0.3))),
         ("5", "hold=pull:release", Event(500, "hold", "pull", None)),
         ("0", "iterate=12", Event(0, "solve", "iterate", 12)),
+        ("0.5", "show=3", Event(50, "solve", "show", 3)),
     ],
 )
 def test_events_are_read_from_text(at: str, what: str, event: Event) -> None:
@@ -478,8 +540,10 @@ def test_text_that_is_no_event_is_refused(at: str, what: str, sentence: str) -> 
         {"kind": "hold", "value": [1.0, 2.0]},
         {"kind": "hold", "value": "abc"},
         {"kind": "hold", "value": 5},
-        {"kind": "solve", "value": -1},
-        {"kind": "solve", "value": 1e9},
+        {"kind": "solve", "name": "iterate", "value": -1},
+        {"kind": "solve", "name": "show", "value": 1.5},
+        {"kind": "solve", "name": "jump", "value": 1},
+        {"kind": "solve", "name": "iterate", "value": 1e9},
     ],
 )
 def test_a_change_of_an_export_that_makes_no_sense_is_refused(wrong: dict[str, Any]) -> None:

@@ -132,3 +132,6 @@ class Oscillator(Lab[OscillatorParams, OscillatorState]):
         scene.label("name", f"x = {state.x:.1f}", (state.x, 0.0, 1.0))
         scene.arrow("arrow", (0.0, 0.0, 0.5), (state.x, 0.0, 0.5))
         scene.trail("line", np.array([[-1.0, 0, 0], [1.0, 0, 0]]), "muted")
+        for k in (1, 2, 3):  # fading behind the ball
+            ends = np.array([[state.x - 0.1 * k, 0, 0], [state.x - 0.1 * k, 0, 0.2]])
+            scene.trail(f"echo {k}", ends, "actual", strength=0.25 * (4 - k))

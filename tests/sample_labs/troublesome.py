@@ -1,5 +1,6 @@
 """A lab that goes wrong on demand: it diverges, raises, or never comes back."""
 
+import os
 import time
 from dataclasses import dataclass, replace
 
@@ -52,6 +53,11 @@ class Troublesome(Lab[TroublesomeParams, TroublesomeState]):
                 while time.perf_counter() < end:
                     pass
         return replace(state, t=t, x=float(np.sin(t)))
+
+    @classmethod
+    def prepare(cls) -> None:
+        """Takes as long as it is told: as on a machine that has never compiled the solvers."""
+        time.sleep(float(os.environ.get("PREPARE_SECONDS", "0")))
 
     def measure(self, params: TroublesomeParams, state: TroublesomeState) -> Measurement:
         return {"x": state.x}

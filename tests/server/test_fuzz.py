@@ -20,6 +20,8 @@ OPERATIONS = [
     "POST /api/sessions/{session_id}/commands",
     "GET /api/sessions/{session_id}/command",
     "GET /api/sessions/{session_id}/export.{form}",
+    "GET /api/sessions/{session_id}/solution.{form}",
+    "PUT /api/sessions/{session_id}/solution",
 ]
 
 

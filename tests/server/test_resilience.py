@@ -2,12 +2,14 @@
 
 import os
 import signal
+from pathlib import Path
 
 import numpy as np
 import psutil
 import pytest
 
-from tests.served import Served, until
+from tests.served import Opened, Served, until
+from tests.viser_client import SceneClient
 
 
 def test_a_killed_worker_is_replaced_with_the_same_parameters(served: Served) -> None:
@@ -143,6 +145,49 @@ def test_no_process_survives_the_server(how: signal.Signals) -> None:
     os.kill(server.process.pid, how)
     server.process.wait(20)
     assert not psutil.wait_procs(below, timeout=10)[1], "these survived"
+
+
+def test_the_first_start_may_take_its_time() -> None:
+    """Longer than a hung worker is given, and than a session nobody watches."""
+    with Served(
+        wait=False,
+        PREPARE_SECONDS="8",
+        ORCLAB_HANG_SECONDS="1",
+        ORCLAB_VIEWERLESS_SECONDS="5",
+    ) as server:
+        assert server.health()["preparing"]
+        with server.session("oscillator") as session, session.stream() as stream:
+            assert stream.next("status", lambda s: s["t"] > 0)
+            assert not server.health()["preparing"]
+        assert server.process.stdout is not None
+        assert server.process.stdout.readline().startswith("First start: compiling the solvers")
+
+
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_a_server_that_still_prepares_ends_at_once(how: signal.Signals) -> None:
+    server = Served(wait=False, PREPARE_SECONDS="600")
+    assert server.process.stdout is not None
+    assert server.process.stdout.readline().startswith("First start")
+    below = server.workers()
+    assert below
+    server.stop(how)
+    assert not psutil.wait_procs(below, timeout=10)[1], "these survived"
+
+
+def test_a_server_ends_quietly_though_its_viewers_worker_is_stuck(tmp_path: Path) -> None:
+    """The scenes' relays wait for a worker that does not even close its connections."""
+    said = tmp_path / "stderr"
+    with said.open("w") as stderr, Served(ORCLAB_SPARES="0", stderr=stderr) as server:
+        session = Opened(server, "oscillator", {})
+        (worker,) = server.listeners()
+        viewers = [SceneClient(session) for _ in range(5)]
+        os.kill(worker, signal.SIGSTOP)
+        server.stop()
+        for viewer in viewers:
+            viewer.socket.close()
+    text = said.read_text()
+    assert "Traceback" not in text
+    assert "Exception" not in text
 
 
 def test_a_restarted_server_answers_404_for_the_old_session() -> None:

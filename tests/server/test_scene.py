@@ -2,10 +2,16 @@
 
 from collections import Counter
 
+import numpy as np
 import pytest
+import viser
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from server.mailbox import Mailbox
+from server.messages import View
+from server.nodes import COLORS, DARK, LIGHT, paler
+from server.viser_scene import ViserScene
 from tests.served import Served
 from tests.viser_client import PROTOCOL, SceneClient, message
 
@@ -106,6 +112,31 @@ def test_a_dragged_handle_reaches_the_world(served: Served) -> None:
         stream.next("telemetry", lambda m: m["rows"] and m["rows"][-1][6] == 0.0)
         changes = session.export()["changes"]
         assert [c["value"] for c in changes if c["kind"] == "hold"][-1] is None
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_a_weaker_trail_is_nearer_to_what_is_behind_it(dark: bool) -> None:
+    full, half, faint = (paler("actual", s, dark).astype(int) for s in (1.0, 0.5, 0.1))
+    behind = np.array(DARK if dark else LIGHT)
+    assert full.tolist() == list(COLORS["actual"])
+    distances = [np.linalg.norm(color - behind) for color in (full, half, faint)]
+    assert distances == pytest.approx([distances[0], 0.5 * distances[0], 0.1 * distances[0]], abs=1)
+
+
+def test_a_trail_fades_without_being_made_anew() -> None:
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+    try:
+        scene = ViserScene(server, Mailbox(), View(dark=True))
+        points = np.zeros((3, 3))
+        scene.trail("echo", points)
+        node = scene._nodes["echo"]
+        for strength in (1.0, 0.3):
+            scene.trail("echo", points, strength=strength)
+            shown = node._handle.colors
+            assert shown.tolist() == paler("actual", strength, dark=True).tolist()
+        assert scene._nodes["echo"] is node
+    finally:
+        server.stop()
 
 
 def test_the_scene_of_an_unknown_session_is_closed_for_good(served: Served) -> None:

@@ -47,15 +47,16 @@ export class Board {
     for (const plot of this.series) plot.rebuild();
   }
 
-  telemetry({ run, rows, fields }) {
+  telemetry({ run, rows, now, fields }) {
     if (!this.run) return;
+    if (now || rows.length) this.now = now; // between two samples, while time stands still
     for (const row of rows) {
       const restarted = run !== this.number || (this.run.length > 0 && row[0] < this.run.last);
       if (restarted) this.begin(run);
       if (!this.run.length || row[0] > this.run.last) this.run.push(row);
     }
     if (fields) for (const plot of this.pictured) plot.update(fields);
-    if (rows.length) this.refresh();
+    if (rows.length || now) this.refresh();
   }
 
   // Another run: what was drawn so far turns into the faint trace.
@@ -101,7 +102,7 @@ export class Board {
     this.pending = requestAnimationFrame(() => {
       this.pending = 0;
       for (const plot of this.series) plot.draw();
-      this.readouts.update(this.run);
+      this.readouts.update(this.run, this.now);
     });
   }
 

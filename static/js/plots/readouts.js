@@ -20,9 +20,9 @@ export class Readouts {
     host.hidden = plots.length === 0;
   }
 
-  update(run) {
+  update(run, now) {
     for (const { channel, output, whole } of this.tiles) {
-      const value = run.latest(channel);
+      const value = now ? now[run.columns.indexOf(channel)] : run.latest(channel);
       const text = whole && Number.isInteger(value) ? String(value) : number(value, 3);
       if (output.textContent !== text) output.textContent = text;
     }

@@ -1,0 +1,281 @@
+"""The backward pass of differential dynamic programming (notes, 2.4.6), compiled.
+
+From the end to the start, with V' the value function of the next step and f the dynamics,
+
+    Q_x  = l_x  + f_x' V'_x                    Q_u  = l_u  + f_u' V'_x
+    Q_xx = l_xx + f_x' V'_xx f_x + V'_x f_xx   Q_uu = l_uu + f_u' V'_xx f_u + V'_x f_uu
+    Q_ux = l_ux + f_u' V'_xx f_x + V'_x f_ux
+    w = -(Q_uu + mu I)^-1 Q_u,                 K = -(Q_uu + mu I)^-1 Q_ux
+    V_x  = Q_x + K' Q_u + K' Q_uu w + Q_xu w
+    V_xx = Q_xx + K' Q_uu K + K' Q_ux + Q_xu K, symmetrised
+
+and the expected change of the cost for a step alpha w is alpha d_1 + alpha^2 d_2 / 2 with
+d_1 = sum w' Q_u, d_2 = sum w' Q_uu w.
+
+With bounds on the control (beyond the notes) w minimises the same quadratic model within them,
+by a projected Newton method, and K is zero in the rows of w that touch a bound (Tassa, Mansard
+and Todorov, "Control-limited differential dynamic programming", 2014).
+"""
+
+import numpy as np
+
+from labs.algorithms.compiled import compiled
+
+NEWTON, HALVINGS = 50, 30
+"""At most, of the projected Newton method and of its line search."""
+
+
+@compiled
+def backward_pass(
+    A: np.ndarray,
+    B: np.ndarray,
+    second: np.ndarray,
+    l_x: np.ndarray,
+    l_u: np.ndarray,
+    l_xx: np.ndarray,
+    l_ux: np.ndarray,
+    l_uu: np.ndarray,
+    mu: float,
+    low: np.ndarray,
+    high: np.ndarray,
+    w: np.ndarray,
+    K: np.ndarray,
+) -> tuple[int, float, float]:
+    """Fills w (N, m) and K (N, m, n); gives -1, d_1, d_2, or the step where Q_uu + mu I is not
+    positive definite.
+
+    A (N, n, n) and B (N, n, m) are f_x and f_u; `second` is f'' (N, n, n + m, n + m) over (x, u),
+    or empty for none of it (Gauss-Newton, iLQR); l_x and l_xx have N + 1 entries, the last of
+    the final cost. `low` and `high` (N, m) bound w; both empty: no bounds."""
+    N, n, m = B.shape
+    bounded = low.shape[0] > 0
+    V_x, V_xx = l_x[N].copy(), l_xx[N].copy()
+    F, VF, H = np.empty((n, n + m)), np.empty((n, n + m)), np.empty((n + m, n + m))
+    L, Q_u, held = np.empty((m, m)), np.empty(m), np.zeros(m, np.bool_)
+    lower, slopes = np.empty((n + m, n)), np.empty(n + m)
+    d_1 = d_2 = 0.0
+    for t in range(N - 1, -1, -1):
+        for i in range(n):
+            F[i, :n], F[i, n:] = A[t, i], B[t, i]
+        # H = [Q_xx Q_xu; Q_ux Q_uu], slopes = [Q_x; Q_u].
+        _product(V_xx, F, VF)
+        for j in range(n + m):
+            for i in range(n):
+                lower[j, i] = F[i, j]
+        _product(lower, VF, H)
+        slopes[:n], slopes[n:] = l_x[t], l_u[t]
+        for j in range(n + m):
+            for i in range(n):
+                slopes[j] += lower[j, i] * V_x[i]
+        H[:n, :n] += l_xx[t]
+        H[n:, :n] += l_ux[t]
+        H[:n, n:] += l_ux[t].T
+        H[n:, n:] += l_uu[t]
+        if second.shape[0] > 0:
+            for i in range(n):
+                p = V_x[i]
+                for j in range(n + m):
+                    for k in range(n + m):
+                        H[j, k] += p * second[t, i, j, k]
+        Q_u[:] = slopes[n:]
+        for i in range(m):
+            held[i] = False
+            w[t, i] = 0.0
+        if bounded:
+            if not _within(H, n, mu, Q_u, low[t], high[t], w[t], held, L):
+                return t, 0.0, 0.0
+        elif not _cholesky(H, n, mu, held, L):
+            return t, 0.0, 0.0
+        else:
+            for i in range(m):
+                w[t, i] = -Q_u[i]
+            _solve(L, w[t])
+        gain = K[t]
+        for i in range(m):
+            for j in range(n):
+                gain[i, j] = 0.0 if held[i] else -H[n + i, j]
+        _solve_columns(L, gain)
+        for i in range(m):
+            curved = 0.0
+            for j in range(m):
+                curved += H[n + i, n + j] * w[t, j]
+            d_1 += w[t, i] * Q_u[i]
+            d_2 += w[t, i] * curved
+            slopes[n + i] = curved
+        _value(H, slopes, Q_u, w[t], gain, V_x, V_xx)
+    return -1, d_1, d_2
+
+
+@compiled
+def costate(A: np.ndarray, B: np.ndarray, l_x: np.ndarray, l_u: np.ndarray) -> np.ndarray:
+    """dJ/dU (N, m), the gradient of the cost of a rollout with respect to its controls: with
+    p_N = l_x(N) and p_t = l_x + A' p_(t+1), it is l_u + B' p_(t+1)."""
+    N, n, m = B.shape
+    p, earlier, gradient = l_x[N].copy(), np.empty(n), l_u.copy()
+    for t in range(N - 1, -1, -1):
+        earlier[:] = l_x[t]
+        for i in range(n):
+            for j in range(m):
+                gradient[t, j] += B[t, i, j] * p[i]
+            for j in range(n):
+                earlier[j] += A[t, i, j] * p[i]
+        p[:] = earlier
+    return gradient
+
+
+@compiled
+def _product(left: np.ndarray, right: np.ndarray, out: np.ndarray) -> None:
+    """out = left right, row by row, so that the inner loop runs along memory."""
+    for i in range(left.shape[0]):
+        row = out[i]
+        row[:] = 0.0
+        for k in range(left.shape[1]):
+            factor = left[i, k]
+            if factor != 0.0:
+                for j in range(right.shape[1]):
+                    row[j] += factor * right[k, j]
+
+
+@compiled
+def _value(
+    H: np.ndarray,
+    curved: np.ndarray,
+    Q_u: np.ndarray,
+    w: np.ndarray,
+    K: np.ndarray,
+    V_x: np.ndarray,
+    V_xx: np.ndarray,
+) -> None:
+    """V_x and V_xx of this step, into those of the next; `curved` is [Q_x; Q_uu w]."""
+    m, n = K.shape
+    QK = np.empty((m, n))
+    for i in range(m):
+        for j in range(n):
+            QK[i, j] = H[n + i, j]
+        for k in range(m):
+            factor = H[n + i, n + k]
+            for j in range(n):
+                QK[i, j] += factor * K[k, j]
+    for i in range(n):
+        V_x[i] = curved[i]
+        for k in range(m):
+            V_x[i] += K[k, i] * (Q_u[k] + curved[n + k]) + H[n + k, i] * w[k]
+        for j in range(n):
+            V_xx[i, j] = H[i, j]
+    # K' (Q_uu K + Q_ux) + Q_xu K
+    for k in range(m):
+        for i in range(n):
+            left, cross = K[k, i], H[n + k, i]
+            for j in range(n):
+                V_xx[i, j] += left * QK[k, j] + cross * K[k, j]
+    for i in range(n):
+        for j in range(i):
+            V_xx[i, j] = V_xx[j, i] = 0.5 * (V_xx[i, j] + V_xx[j, i])
+
+
+@compiled
+def _cholesky(H: np.ndarray, n: int, mu: float, held: np.ndarray, L: np.ndarray) -> bool:
+    """L L' = Q_uu + mu I over the entries not held, those held replaced by the identity; False if
+    it is not positive definite."""
+    m = len(held)
+    for i in range(m):
+        for j in range(i + 1):
+            if held[i] or held[j]:
+                L[i, j] = 1.0 if i == j else 0.0
+                continue
+            rest = H[n + i, n + j] + (mu if i == j else 0.0)
+            for k in range(j):
+                rest -= L[i, k] * L[j, k]
+            if i > j:
+                L[i, j] = rest / L[j, j]
+            elif rest > 1e-14 * (abs(H[n + i, n + i]) + mu):
+                L[i, i] = np.sqrt(rest)
+            else:
+                return False
+    return True
+
+
+@compiled
+def _solve(L: np.ndarray, y: np.ndarray) -> None:
+    """y becomes (L L')^-1 y."""
+    m = len(y)
+    for i in range(m):
+        for k in range(i):
+            y[i] -= L[i, k] * y[k]
+        y[i] /= L[i, i]
+    for i in range(m - 1, -1, -1):
+        for k in range(i + 1, m):
+            y[i] -= L[k, i] * y[k]
+        y[i] /= L[i, i]
+
+
+@compiled
+def _solve_columns(L: np.ndarray, Y: np.ndarray) -> None:
+    """Y becomes (L L')^-1 Y."""
+    m, n = Y.shape
+    for i in range(m):
+        for k in range(i):
+            for j in range(n):
+                Y[i, j] -= L[i, k] * Y[k, j]
+        for j in range(n):
+            Y[i, j] /= L[i, i]
+    for i in range(m - 1, -1, -1):
+        for k in range(i + 1, m):
+            for j in range(n):
+                Y[i, j] -= L[k, i] * Y[k, j]
+        for j in range(n):
+            Y[i, j] /= L[i, i]
+
+
+@compiled
+def _within(
+    H: np.ndarray,
+    n: int,
+    mu: float,
+    Q_u: np.ndarray,
+    low: np.ndarray,
+    high: np.ndarray,
+    w: np.ndarray,
+    held: np.ndarray,
+    L: np.ndarray,
+) -> bool:
+    """Minimises w' (Q_uu + mu I) w / 2 + Q_u' w within low <= w <= high by projected Newton
+    steps from w = 0, which is within. Leaves in `held` the entries at a bound that push against
+    it and in L the factor over the others; False if that part is not positive definite."""
+    m = len(w)
+    slope, newton, trial = np.empty(m), np.empty(m), np.empty(m)
+    value = 0.0
+    for _ in range(NEWTON):
+        for i in range(m):
+            slope[i] = Q_u[i] + mu * w[i]
+            for j in range(m):
+                slope[i] += H[n + i, n + j] * w[j]
+        for i in range(m):
+            held[i] = (w[i] <= low[i] and slope[i] > 0.0) or (w[i] >= high[i] and slope[i] < 0.0)
+            newton[i] = 0.0 if held[i] else -slope[i]
+        if not _cholesky(H, n, mu, held, L):
+            return False
+        _solve(L, newton)
+        steepness = 0.0
+        for i in range(m):
+            steepness += newton[i] * slope[i]
+        if steepness > -1e-16 * (1.0 + abs(value)):
+            return True
+        step = 1.0
+        for _ in range(HALVINGS):
+            for i in range(m):
+                trial[i] = min(max(w[i] + step * newton[i], low[i]), high[i])
+            reached = forecast = 0.0
+            for i in range(m):
+                forecast += slope[i] * (trial[i] - w[i])
+                reached += trial[i] * (Q_u[i] + 0.5 * mu * trial[i])
+                for j in range(m):
+                    reached += 0.5 * trial[i] * H[n + i, n + j] * trial[j]
+            if reached <= value + 0.1 * forecast:
+                break
+            step *= 0.5
+        else:
+            return True  # no step improves: w is the minimum to rounding
+        value = reached
+        w[:] = trial
+    return True

@@ -1,0 +1,125 @@
+"""The solver's clock of a live session: when it iterates. What it finds never depends on that."""
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from labs.errors import LabError
+from labs.run import World
+from server.messages import SolverStatus
+
+MOST_OWED = 1000
+SLIP = 0.2
+"""[s] It may lag behind its pace and still catch up; what is beyond is given up."""
+ESTIMATE_AFTER = 0.5
+"""[s] of its own time, before which nobody can tell how long it will take."""
+
+
+class SolverClock:
+    """Runs, holds and steps a world's solver, and looks back at what it found."""
+
+    def __init__(self, world: World, told: Mapping[str, Any] | None) -> None:
+        """`told`: the last status of the session's solver, if it had one."""
+        self._world = world
+        self.running: bool = told["running"] if told else True
+        self.pace: float = told["pace"] if told else 0.0
+        self._owed = 0
+        """Iterations to do although paused."""
+        self._next = 0.0
+        """When the next one is due [s, wall clock]."""
+        self._begin(0.0)
+
+    def _follow(self, now: float) -> None:
+        if self._world.solves != self._solves:
+            self._begin(now)
+
+    def _begin(self, now: float) -> None:
+        """The solver was started anew."""
+        self._solves = self._world.solves
+        self._owed = 0
+        self._next = 0.0
+        self._active = False
+        self._last = now
+        self._spent = 0.0
+        """[s] of the wall clock, since it was started and while it ran."""
+        self._before = self._progress()
+
+    def obey(self, do: str, **arguments: Any) -> None:
+        """Runs, pauses, steps, shows or sets the pace. Raises LabError."""
+        if not self._world.lab.has_solver():
+            raise LabError("this lab has no solver")
+        self._follow(time.perf_counter())
+        getattr(self, f"_do_{do}")(**arguments)
+
+    def _do_run(self) -> None:
+        """Goes on from the latest iteration, wherever one looked back to."""
+        self.running, self._owed = True, 0
+        if self._world.latest and not self._world.solving:
+            self._world.show(self._world.latest.iteration)
+
+    def _do_pause(self) -> None:
+        self.running = self._active = False
+        self._owed = 0
+
+    def _do_step(self, count: int) -> None:
+        self.running = False
+        self._owed = min(self._owed + count, MOST_OWED)
+
+    def _do_show(self, iteration: int) -> None:
+        self._do_pause()
+        self._world.show(iteration)
+
+    def _do_pace(self, pace: float) -> None:
+        self.pace, self._next = pace, 0.0
+
+    def iterate(self, now: float, until: float) -> None:
+        """What is due: one iteration at least, and no further one begins after `until`."""
+        world = self._world
+        self._follow(now)
+        if self._active:
+            self._spent += now - self._last
+        self._last = now
+        self._active = world.solving and (self.running or self._owed > 0)
+        while world.solving and self._is_due(now):
+            world.iterate()
+            if time.perf_counter() > until:
+                break
+
+    def status(self) -> SolverStatus | None:
+        """How it stands; None where there is no solver."""
+        world = self._world
+        if not world.lab.has_solver():
+            return None
+        first, latest = world.kept.first, world.latest
+        return SolverStatus(
+            iteration=world.shown.iteration if world.shown else 0,
+            latest=latest.iteration if latest else 0,
+            kept=(first.iteration, latest.iteration) if first and latest else None,
+            running=self.running,
+            pace=self.pace,
+            done=latest.done if latest else "",
+            progress=latest.progress if latest else None,
+            seconds_left=self._seconds_left(),
+        )
+
+    def _is_due(self, now: float) -> bool:
+        if self._owed:
+            self._owed -= 1
+            return True
+        if not self.running:
+            return False
+        if self.pace:
+            if now < self._next:
+                return False
+            self._next = max(self._next, now - SLIP) + 1.0 / self.pace
+        return True
+
+    def _progress(self) -> float:
+        latest = self._world.latest
+        return (latest.progress or 0.0) if latest else 0.0
+
+    def _seconds_left(self) -> float | None:
+        made = self._progress() - self._before
+        if not self._world.solving or made <= 0.0 or self._spent < ESTIMATE_AFTER:
+            return None
+        return self._spent * (1.0 - self._progress()) / made

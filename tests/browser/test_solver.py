@@ -1,0 +1,154 @@
+"""The solver's row of a lab's page: run, step, look back, pace, save and load."""
+
+import re
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.browser.conftest import Visit, screenshot
+from tests.browser.lab_page import LabPage
+from tests.served import Served
+
+DONE = re.compile("steps done")
+
+
+def iteration(page: Page) -> int:
+    return int(page.locator("#iterations").inner_text().split()[0])
+
+
+def test_it_runs_is_held_and_goes_step_by_step(page: Page) -> None:
+    LabPage(page).open("descent")
+    expect(page.locator("#solver-says")).to_have_text(DONE)
+    expect(page.locator("#iterations")).to_have_text("200")
+    page.keyboard.press("o")
+    expect(page.locator("#solve")).to_have_attribute("aria-pressed", "false")
+    page.keyboard.press("r")
+    expect(page.locator("#iterations")).to_have_text("0")
+    expect(page.locator("#solver-says")).to_have_text("Paused before the first iteration")
+    page.keyboard.press("i")
+    page.keyboard.press("i")
+    expect(page.locator("#iterations")).to_have_text("2")
+    page.get_by_role("button", name="One iteration").click()
+    expect(page.locator("#iterations")).to_have_text("3")
+    page.get_by_role("button", name="Run the solver").click()
+    expect(page.locator("#iterations")).to_have_text("200")
+    # A lab without a world: its one clock has the usual keys too.
+    page.locator("h1").click()
+    page.keyboard.press("Space")
+    expect(page.locator("#solve")).to_have_attribute("aria-pressed", "false")
+
+
+def test_a_pace_shows_progress_and_the_time_left(page: Page) -> None:
+    LabPage(page).open("descent")
+    page.select_option("#solver-pace", "30")
+    page.locator("h1").click()
+    page.keyboard.press("r")
+    expect(page.locator("#solver-says")).to_have_text(re.compile(r"^\d+ %, \d+ s left$"))
+    screenshot(page, "solver")
+    now = iteration(page)
+    assert 0 < now < 200
+    expect(page.locator("#solver-says")).to_have_text(DONE)
+
+
+def test_dragging_back_shows_what_was_and_its_end_the_latest(page: Page) -> None:
+    LabPage(page).open("descent")
+    expect(page.locator("#iterations")).to_have_text("200")
+    slider = page.locator("#iteration")
+    box = slider.bounding_box()
+    assert box
+    y = box["y"] + box["height"] / 2
+    page.mouse.move(box["x"] + box["width"] - 8, y)
+    page.mouse.down()
+    for part in (0.8, 0.6, 0.4):
+        page.mouse.move(box["x"] + part * box["width"], y)
+        page.wait_for_timeout(100)
+    page.mouse.up()
+    expect(page.locator("#iterations")).to_have_text(re.compile(r"^[6-9]\d of 200$"))
+    expect(page.locator("#solver-says")).to_have_text("Looking back")
+    expect(page.locator("#solve")).to_have_attribute("aria-pressed", "false")
+    slider.press("End")
+    expect(page.locator("#iterations")).to_have_text("200")
+    slider.press("Home")
+    expect(page.locator("#iterations")).to_have_text("1 of 200")
+    expect(page.get_by_label("Cost")).to_have_text("1.70")
+    page.keyboard.press("ArrowRight")
+    expect(page.locator("#iterations")).to_have_text("2 of 200")
+
+
+@pytest.mark.parametrize("form", ["npz", "json"])
+def test_a_solution_is_taken_home_and_brought_back(page: Page, tmp_path: Path, form: str) -> None:
+    lab = LabPage(page).open("descent", "?rate=0.03&many=40")
+    expect(page.locator("#iterations")).to_have_text("40")
+    page.get_by_role("button", name="Solution").click()
+    with page.expect_download() as download:
+        page.locator(f"[data-solution={form}]").click()
+    path = tmp_path / download.value.suggested_filename
+    download.value.save_as(path)
+    lab.open("descent")
+    expect(page.locator("#iterations")).to_have_text("200")
+    page.get_by_role("button", name="Solution").click()
+    with page.expect_file_chooser() as chooser:
+        page.get_by_role("button", name="Load solution").click()
+    chooser.value.set_files(path)
+    expect(page.locator("#toasts")).to_contain_text("Solution loaded")
+    expect(page.locator("#iterations")).to_have_text("40")
+    expect(lab.value("rate")).to_have_value("0.03")
+    expect(page).to_have_url(re.compile("rate=0.03"))
+    page.get_by_role("button", name="Run the solver").click()
+    expect(page.locator("#iterations")).to_have_text("80")
+
+
+def test_a_wrong_file_is_refused_in_a_sentence(page: Page, tmp_path: Path) -> None:
+    LabPage(page).open("descent")
+    expect(page.locator("#iterations")).to_have_text("200")
+    (tmp_path / "wrong.json").write_text("[]")
+    page.set_input_files("#solution-file", tmp_path / "wrong.json")
+    expect(page.locator("#toasts")).to_contain_text(
+        "wrong.json was not loaded: this is no solution"
+    )
+    expect(page.locator("#iterations")).to_have_text("200")
+
+
+def test_a_lab_without_a_solver_has_no_such_row(page: Page) -> None:
+    LabPage(page).open("troublesome")
+    expect(page.locator("#solver")).to_have_count(0)
+    page.keyboard.press("o")
+    page.keyboard.press("i")
+    expect(page.locator("#toasts")).to_be_empty()
+
+
+@pytest.mark.parametrize("width", [360, 820, 1100, 1500])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_nothing_overflows_and_nothing_jumps(
+    visit: Visit, served: Served, width: int, scheme: str
+) -> None:
+    context = visit(served, viewport={"width": width, "height": 800}, color_scheme=scheme)
+    page = context.new_page()
+    page.route("**/scene/*/**", lambda route: route.fulfill(body="<!doctype html>"))
+    LabPage(page).open("descent")
+    row = page.locator("#solver")
+    expect(page.locator("#solver-says")).to_have_text(DONE)
+    heights = [row.evaluate("row => row.offsetHeight")]
+    page.select_option("#solver-pace", "30")
+    page.get_by_role("button", name="Start again").click()
+    expect(page.locator("#solver-says")).to_have_text(re.compile("left"))
+    heights.append(row.evaluate("row => row.offsetHeight"))
+    page.locator("#iteration").press("Home")
+    expect(page.locator("#solver-says")).to_have_text("Looking back")
+    heights.append(row.evaluate("row => row.offsetHeight"))
+    screenshot(page, f"solver-{width}-{scheme}")
+    assert len(set(heights)) == 1, heights
+    assert page.evaluate("document.documentElement.scrollWidth - innerWidth") <= 0
+
+
+def test_a_page_opened_at_the_first_start_says_what_goes_on(visit: Visit) -> None:
+    with Served(wait=False, PREPARE_SECONDS="8") as server:
+        page = visit(server).new_page()
+        page.goto("/labs/descent")
+        expect(page.locator("#curtain")).to_contain_text(
+            "The first start compiles the solvers, once"
+        )
+        expect(page.locator("#curtain .once")).to_be_visible()
+        screenshot(page, "first-start")
+        expect(page.locator("#curtain.open")).to_be_attached(timeout=120_000)

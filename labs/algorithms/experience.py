@@ -107,4 +107,4 @@ def step_size(rule: Rule, n: int) -> float:
 
 @compiled
 def _shrunk(rule: Rule, n: int) -> float:
-    return rule.alpha * float(n) ** -rule.omega
+    return float(rule.alpha * float(n) ** -rule.omega)

@@ -87,14 +87,14 @@ class Arrows(NullScene):
 
     def __init__(self, setting: Mapping[str, Value], **changes: Value) -> None:
         super().__init__()
-        self.arrows: dict[str, np.ndarray] = {}
+        self.vectors: dict[str, np.ndarray] = {}
         self.axes: dict[str, np.ndarray] = {}
         params = with_(setting, **changes)
         LAB.draw(self, params, start(params))
 
     def arrow(self, name: str, start: ArrayLike, end: ArrayLike, color: Color = "force") -> None:
         super().arrow(name, start, end, color)
-        self.arrows[name] = np.array([start, end])
+        self.vectors[name] = np.array([start, end])
 
     def ellipsoid(
         self, name: str, center: ArrayLike, axes: np.ndarray, color: Color = "actual"
@@ -335,8 +335,8 @@ def test_what_a_step_takes_in_is_left_alone() -> None:
 def test_columns_are_drawn_as_they_are() -> None:
     for robot, n in (("ur5", 6), ("panda", 7), ("scara", 4)):
         drawn, found = Arrows({}, robot=robot), fields({}, robot=robot)["geometric"]
-        assert sum(name.startswith("axis") for name in drawn.arrows) == n
-        for name, (tail, head) in drawn.arrows.items():
+        assert sum(name.startswith("axis") for name in drawn.vectors) == n
+        for name, (tail, head) in drawn.vectors.items():
             if name.startswith("column"):
                 column = found[:3, int(name.split()[1]) - 1]
                 np.testing.assert_allclose(head - tail, COLUMN * column, atol=1e-14)

@@ -145,8 +145,8 @@ def test_no_end_no_sum(setting: Mapping[str, Value]) -> None:
         world.iterate()
         values.append(world.state.V)
     np.testing.assert_allclose(values[-1] - values[-2], -0.412, atol=5e-4)
-    assert world.solution is not None
-    assert world.solution.done == "Stopped at k = 200: V has no limit."
+    assert world.latest is not None
+    assert world.latest.done == "Stopped at k = 200: V has no limit."
     assert "I − P is singular" in said(world)
     assert "costs −0.412 on average" in said(world)
     process = process_of(world)

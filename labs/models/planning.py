@@ -18,7 +18,7 @@ from labs.models.finite_mdp import FiniteMDP, random_policy
 from labs.models.grid_worlds import GridWorld
 from labs.models.pendulum_mdp import PendulumGrid, advance, pendulum_grid
 
-HORIZON = 60
+HORIZON = 40
 """Steps to go at most."""
 TICK = 0.01
 """[s]"""

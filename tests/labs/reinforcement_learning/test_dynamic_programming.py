@@ -126,9 +126,9 @@ def angles(world: World, seconds: float) -> np.ndarray:
 @ARTICLE.verify("Swing up by table")
 def test_the_table_swings_the_pendulum_up(setting: Setting) -> None:
     world = solved(setting)
-    off = angles(world, 8.0)
+    off = angles(world, 30.0)
     assert 1.9 < 0.01 * np.flatnonzero(off < 0.2)[0] < 2.3
-    assert off[400:].max() < 0.2
+    assert 0.15 < off[400:].max() < 0.25
     turned = np.unwrap(world.recording().channels["angle"])
     assert turned[:200].max() - turned[0] > 0.3, "to one side"
     assert turned[:200].min() - turned[0] < -0.3, "and to the other"
@@ -201,9 +201,9 @@ def test_four_iterations_from_one_seed_reach_their_limits() -> None:
     np.testing.assert_allclose(at.V, found.limits, atol=1e-4)
     bound = one.lab.fields(one.params, one.state)
     assert (bound["error_value"] <= bound["bound"] + 1e-9).all()
-    assert one.solution is not None
-    assert one.solution.done == "All four iterations have converged."
-    assert one.solution.progress == 1.0
+    assert one.latest is not None
+    assert one.latest.done == "All four iterations have converged."
+    assert one.latest.progress == 1.0
 
 
 def test_a_kept_snapshot_shows_its_sweep_again_and_nothing_is_written_into() -> None:
@@ -258,7 +258,7 @@ def test_what_has_no_limit_is_not_begun_and_says_why() -> None:
     sealed = MAPS["4x4"].replace("....\n....", "#...\n.#..", 1)
     world = solved({"map": "G.\n#.\n.#", "gamma": 1.0})
     assert (world.state.standing.count == 0).all()
-    done = world.solution.done if world.solution else ""
+    done = world.latest.done if world.latest else ""
     assert "Value iteration: not begun: with gamma = 1 the cost-to-go of 1 of 4 states" in done
     assert "From 1 states no way" in world.lab.notes(world.params, world.state)["about"]
     assert (solved({"map": sealed, "gamma": 1.0}).state.standing.count > 0).all()

@@ -45,7 +45,8 @@ def draw_grid(
     size = CELL * max(columns, 1.6 * rows)
     scene.camera((0.0, -0.5 * size, 0.6 * size), (0.0, -0.04 * size, 0.0))
     value = tables[shown].min(axis=1)
-    dearest = task.q_star[task.judged].min(axis=1).max(initial=1.0)
+    best = task.q_star[task.judged].min(axis=1).max(initial=1.0)
+    dearest = float(np.clip(value.max(), best, 3.0 * best))
     colors = sequential(task.laid(dearest - value), 0.0, dearest)
     letters = np.array([list(row) for row in world.rows])
     for letter, color in (("#", WALL), ("C", CLIFF), ("G", GOAL)):
@@ -80,7 +81,8 @@ def draw_pendulum(
 ) -> None:
     """The pendulums, and the surface of min_u Q over angle and velocity with a ball where each
     of them is."""
-    scene.camera((1.75, -0.35, 1.35), (0.0, 0.0 - 0.25 * (len(names) - 1), 0.45))
+    aside = -0.25 * (len(names) - 1)
+    scene.camera((1.6, aside - 0.3, 1.3), (0.0, aside + 0.05, 0.45))
     (x, y), (along, across), tall = SURFACE
     value = task.laid(tables[shown].min(axis=1))
     dearest = float(task.q_star.min(axis=1).max())
@@ -90,8 +92,8 @@ def draw_pendulum(
     )
     points = np.stack([x + along * v, y + across * q, 0.05 + height], axis=-1)
     scene.surface("cost to go", points, sequential(dearest - value, 0.0, dearest))
-    scene.label("angle", "angle ⟶", points[-1, 0] + (0.12, 0.2, 0.0))
-    scene.label("velocity", "velocity ⟶", points[0, -1] + (0.5, 0.12, 0.0))
+    scene.label("angle", "angle ⟶", (x + along + 0.1, y + 0.5 * across, 0.02))
+    scene.label("velocity", "⟵ velocity", (x + 0.5 * along, y + across + 0.2, 0.02))
     for m, name in enumerate(names):
         place = (0.0, -0.6 - 0.8 * m)
         scene.arm(f"pendulum {m + 1}", hanging(1, place, RODS[m]), walk.at[m, :1])

@@ -163,7 +163,7 @@ class LearningParams(TaskParams):
         group="Exploration",
         step=0.01,
         effect="solve",
-        help="At the n-th visit of a state ε/n^d: above 0 greedy in the limit (GLIE); β grows.",
+        help="At the k-th visit of a state ε/k^d: above 0 greedy in the limit (GLIE); β grows.",
     )
     beta: float = knob(
         1.0,

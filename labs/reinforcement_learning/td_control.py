@@ -54,7 +54,7 @@ class TdParams(LearningParams):
         0,
         0,
         8,
-        symbol="u",
+        symbol=r"u_{map}",
         unit="",
         label="Control of the map",
         group="View",
@@ -101,7 +101,7 @@ class TdControl(Lab[TdParams, TdState]):
     period = PERIOD
     plots = (
         _curves("Cost of an episode while learning", "J", "online", "online_low", "online_high"),
-        _curves("Cost of the greedy policy, median", "J", "offline", "offline_low", "offline_high"),
+        _curves("Cost of the greedy policy, median", "J", "offline"),
         _curves("Distance to Q*", "mean (root of squares); dashed: largest", "off", "most"),
         HeatMap("Q of the learner shown", "x", "y", "q", *AXES, "Q"),
         HeatMap("Greedy policy", "x", "y", "policy", *AXES, "u"),
@@ -260,8 +260,8 @@ def _present(params: TdParams, state: TdState) -> Training:
 
 
 def _progress(task: Task, training: Training) -> dict[str, np.ndarray]:
-    """The curves over episodes: the mean of all learners between the least and the largest, and
-    of what their greedy policies cost the median between the quartiles."""
+    """The curves over episodes: the mean (of greedy costs the median) of all learners, the least
+    and the largest."""
     episodes, none = training["episodes"], np.zeros(0)
     best = float(task.q_star[task.start].min())
     known = np.isfinite(best) and len(episodes)
@@ -275,12 +275,11 @@ def _progress(task: Task, training: Training) -> dict[str, np.ndarray]:
         curves = {c: training[c][m] if there else np.zeros((1, 0)) for c in CURVES}
         curves["online"] = _smooth(curves["online"])
         for curve, points in curves.items():
-            low, middle, high = points.min(axis=0), points.mean(axis=0), points.max(axis=0)
-            if curve == "offline":  # One learner who walks in circles hides all others in a mean.
-                low, middle, high = np.quantile(points, (0.25, 0.5, 0.75), axis=0)
-            found[f"{curve}_low_{name}"] = low
-            found[f"{curve}_{name}"] = middle
-            found[f"{curve}_high_{name}"] = high
+            # One learner who walks in circles hides all others in a mean of greedy costs.
+            middle = np.median if curve == "offline" else np.mean
+            found[f"{curve}_{name}"] = middle(points, axis=0)
+            found[f"{curve}_low_{name}"] = points.min(axis=0)
+            found[f"{curve}_high_{name}"] = points.max(axis=0)
     return found
 
 

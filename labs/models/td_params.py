@@ -23,7 +23,7 @@ EXPLORERS = {
 }
 """In the order of the numbers in labs/algorithms/exploration.py."""
 BATCHES = 250
-"""Iterations of a training, of as many episodes each as it takes."""
+"""Iterations of a training, or more while its episodes are long."""
 DIVERGED = 1e6
 """Times the largest cost: what no estimate reaches that converges."""
 
@@ -131,7 +131,7 @@ class LearningParams(TaskParams):
         group="Learning",
         scale="log",
         effect="solve",
-        help="Of one training, each of ten learners (pendulum: five); in 250 equal batches.",
+        help="Of one training, each of ten learners (pendulum: five); in about 250 batches.",
     )
     explorer: str = choice(
         "epsilon-greedy",

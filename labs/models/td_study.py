@@ -6,6 +6,7 @@ is a mapping of arrays, M methods with S learners each, after k batches of episo
     q, visits, random          the learners (labs/algorithms/td_control.py), with M in front
     cells (X, 2)               the cells of the map the states stand for
     sound ()                   whether the estimates stayed within bounds
+    lengths (M,)               transitions of an episode, the mean of the last batch
     episodes (k,)              each learner's episodes so far
     online (M, S, k)           mean discounted cost of a batch's episodes: what learning cost
     offline (M, S, k)          cost of the greedy policy after it: what was learned
@@ -18,11 +19,14 @@ import numpy as np
 
 from labs.algorithms.experience import Rule
 from labs.algorithms.exploration import Behavior
-from labs.algorithms.td_control import Learners, greedy_costs, init, step
+from labs.algorithms.td_control import SARSA_LAMBDA, Learners, greedy_costs, init, step
 from labs.models.learning_tasks import Task
 
 Training = Mapping[str, np.ndarray]
 CURVES = ("online", "offline", "off", "most")
+STEP, TRACE, BUDGET = 40.0, 2.5, 4e6
+"""[ns] About what a transition takes, a trace at each transition, and what a batch may take for
+the scene to go on."""
 TRIALS = 20
 """Of a greedy policy where luck has a say in what it costs."""
 KEPT = 1000
@@ -38,6 +42,7 @@ def begin(task: Task, methods: int, seeds: int, rng: np.random.Generator, q0: fl
         "random": np.stack([learners.random] * methods),
         "cells": task.cells,
         "sound": np.array(True),
+        "lengths": np.full(methods, float(task.practice.horizon)),
         "episodes": np.zeros(0),
     } | {name: np.zeros((methods, seeds, 0)) for name in CURVES}
 
@@ -77,11 +82,22 @@ def further(
         "random": np.stack([learners.random for learners in after]),
         "cells": task.cells,
         "sound": np.array(all(learners.sound for learners in after)),
+        "lengths": np.array([learners.lengths.mean() for learners in after]),
         "episodes": np.append(training["episodes"], float(done))[-KEPT:],
     } | {
         name: np.concatenate([training[name], point[..., None]], axis=2)[..., -KEPT:]
         for name, point in points.items()
     }
+
+
+def batch(task: Task, methods: Sequence[int], training: Training, most: int) -> int:
+    """Episodes of the next batch: `most`, or fewer while they are so long that it would take more
+    than the budget. Transitions are counted, not seconds: all machines do the same."""
+    pairs, seeds, load = task.q_star.size, training["q"].shape[1], 0.0
+    for method, length in zip(methods, training["lengths"], strict=True):
+        traces = min(length, pairs) if method == SARSA_LAMBDA else 0.0
+        load += seeds * length * (STEP + TRACE * traces)
+    return int(np.clip(BUDGET / max(load, 1.0), 1, most))
 
 
 def trained(training: Training) -> int:

@@ -14,7 +14,7 @@ from labs.models.learning_tasks import PENDULUM, Task
 from labs.models.learning_views import CELL, board, draw_grid, draw_pendulum
 from labs.models.learning_walks import PERIOD, Walk, set_out, walked
 from labs.models.td_params import BATCHES, METHODS, LearningParams
-from labs.models.td_study import CURVES, Training, begin, fits, further, moved, trained
+from labs.models.td_study import CURVES, Training, batch, begin, fits, further, moved, trained
 from labs.params import Value, choice, knob
 from labs.plots import Curves, HeatMap, Line, Readout, TimeSeries, Trace
 from labs.scene import Scene, cell_at
@@ -162,17 +162,18 @@ class TdControl(Lab[TdParams, TdState]):
             training = begin(task, len(kinds), SEEDS[params.system], rng, params.q0)
         elif not fits(training, task):
             training = moved(training, task, params.q0)
-        batch = -(-round(params.episodes) // BATCHES)
-        for i in range(1, BATCHES + 1):
-            training = further(task, behavior, rule, kinds, training, batch)
-            done = ""
+        begun, wanted, i = trained(training), round(params.episodes), 0
+        most = -(-wanted // BATCHES)
+        done = ""
+        while not done:
+            left = wanted - (trained(training) - begun)
+            episodes = min(left, batch(task, kinds, training, most))
+            training, i = further(task, behavior, rule, kinds, training, episodes), i + 1
             if not training["sound"]:
                 done = "The estimates diverged."
-            elif i == BATCHES:
+            elif left == episodes:
                 done = f"{trained(training)} episodes learned."
-            yield Snapshot(i, training, done, i / BATCHES)
-            if done:
-                return
+            yield Snapshot(i, training, done, 1.0 - (left - episodes) / wanted)
 
     def accept(self, params: TdParams, state: TdState, snapshot: Snapshot) -> TdState:
         training = snapshot.data
@@ -245,10 +246,10 @@ class TdControl(Lab[TdParams, TdState]):
 
     @classmethod
     def prepare(cls) -> None:
-        """Compiles the loops of both worlds."""
+        """Compiles the loops of all methods; the worlds share them."""
         lab = cls()
-        for changes in ({}, {"slip": 0.1}, {"system": "pendulum", "gamma": 0.9}):
-            params = TdParams().change(changes)
+        for method in METHODS:
+            params = TdParams(method=method, second="none")
             state = lab.init(params, np.random.default_rng(0))
             lab.step(params, Inputs(), lab.accept(params, state, next(lab.solve(params, state))))
 

@@ -75,13 +75,13 @@ class DdpParams(MotionParams):
         group="Solver",
         step=0.01,
         effect="solve",
-        help="Size of the controls guessed at first, u = u_ref + A u_0 cos(2 pi f t).",
+        help="Size of the controls guessed at first, u = u_ref + A u_0 cos(2 pi f_0 t).",
     )
     guess_rate: float = knob(
         0.0,
         0.0,
         2.0,
-        symbol="f",
+        symbol="f_0",
         unit="Hz",
         label="Its frequency",
         group="Solver",
@@ -279,7 +279,7 @@ class Ddp(Lab[DdpParams, DdpState]):
             "rad; m",
             (
                 Line("q", "q"),
-                Line("q_open", r"q\ \text{open loop}", "dash"),
+                Line("q_open", r"q^{\text{open}}", "dash"),
                 Line("q_bar", r"\bar q", "limit"),
             ),
             select="joint",
@@ -326,7 +326,7 @@ class Ddp(Lab[DdpParams, DdpState]):
             "rad/s; m/s",
             (
                 Line("v", "v"),
-                Line("v_open", r"v\ \text{open loop}", "dash"),
+                Line("v_open", r"v^{\text{open}}", "dash"),
                 Line("v_bar", r"\bar v", "limit"),
             ),
             select="joint",

@@ -362,8 +362,9 @@ class Ddp(Lab[DdpParams, DdpState]):
         problem = _problem(params)
         at = ddp.init(problem, _first_guess(params, problem), params.options)
         if at.stopped:
-            still = first_guess(problem, params.size, 0.0, 0.0)
-            at = replace(at, X=np.tile(problem.x0, (problem.N + 1, 1)), U=still, cost=0.0)
+            X = np.tile(problem.x0, (problem.N + 1, 1))
+            U = first_guess(problem, params.size, 0.0, 0.0)
+            at = replace(at, X=X, U=U, cost=problem.cost.value(X, U))
         plan = Policy(at.X, at.U, at.K, params.h)
         return DdpState(
             plan=plan,

@@ -220,6 +220,9 @@ def test_a_diverging_guess_keeps_the_plan_and_says_so() -> None:
 def test_a_diverging_first_guess_leaves_the_robot_at_rest() -> None:
     world = solved({**UR5, "integrator": "explicit-euler", "h": 0.04, "horizon": 3.0, "guess": 1.0})
     assert state(world).failed
+    plan = state(world).plan
+    problem = world.params.problem(plan.N, plan.h)  # type: ignore[attr-defined]
+    assert state(world).history.cost == [problem.cost.value(plan.X, plan.U)]
     for _ in range(20):
         world.advance()
     np.testing.assert_allclose(state(world).runs.x[OPEN_LOOP], state(world).plan.X[0], atol=1e-6)

@@ -339,11 +339,11 @@ class Ddp(Lab[DdpParams, DdpState]):
         Readout("missed_open", "Tip off the goal, open loop", "m"),
     )
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
-        "Weak motor": {"limited": True, "limit": 0.3, "guess_rate": 0.85, "guess": 0.3},
+        "Weak motor": {"limited": True, "limit": 0.3, "horizon": 3.0},
         "Cart-pole": {"system": "cart-pole"},
         "Double pendulum": {"system": "double-pendulum"},
-        "Acrobot": {"system": "acrobot", "method": "ilqr"},
-        "Pendubot": {"system": "pendubot", "horizon": 2.0},
+        "Acrobot": {"system": "acrobot", "horizon": 2.5},
+        "Pendubot": {"system": "pendubot"},
         "UR5 reach": {"system": "ur5", "horizon": 1.0, "goal": 3000.0},
         "UR5 with an unknown payload": {
             "system": "ur5",
@@ -413,14 +413,14 @@ class Ddp(Lab[DdpParams, DdpState]):
     def edit(
         self, params: DdpParams, handle: str, point: tuple[float, float, float]
     ) -> Mapping[str, Value]:
-        """The ball is the UR5's target."""
+        """The ball is the UR5's target, to the millimetre."""
         if handle != "target":
             return {}
         changes: dict[str, Value] = {}
         for name, value in zip(("target_x", "target_y", "target_z"), point, strict=True):
             tunable = params.tunables[name]
             assert isinstance(tunable, Knob)
-            changes[name] = min(max(float(value), tunable.low), tunable.high)
+            changes[name] = min(max(round(float(value), 3), tunable.low), tunable.high)
         return changes
 
     # The world's clock ------------------------------------------------------------------------

@@ -28,6 +28,13 @@ STEP = 0.01
 MASS = 1.0
 """Of the mass on a line [kg]."""
 TURN = 2.0 * np.pi
+CAMERAS: Mapping[str, tuple[Vector3, Vector3]] = {
+    "cart-pole": ((2.2, 0.45, 1.2), (0.0, 0.0, 0.8)),
+    "pendulum": ((1.2, 0.6, 1.05), (0.0, 0.0, 0.88)),
+    "mass": ((2.2, 0.45, 1.1), (0.0, 0.0, 0.6)),
+    "ur5": ((0.77, -0.54, 0.62), (0.22, 0.05, 0.38)),
+}
+"""Where a viewer stands and what it looks at [m]."""
 FASTEST = 100.0
 """[m/s, rad/s] faster than this nothing here is meant to go."""
 
@@ -56,6 +63,11 @@ class LinearSystem:
     @property
     def nu(self) -> int:
         return len(self.u_eq)
+
+    @property
+    def camera(self) -> tuple[Vector3, Vector3]:
+        """Where a viewer stands and what it looks at [m]: close, for it moves little."""
+        return CAMERAS[self.name]
 
     def linear(self, period: float) -> tuple[np.ndarray, np.ndarray]:
         """A (nx, nx) and B (nx, nu) over `period` [s], a multiple of STEP."""
@@ -164,7 +176,7 @@ def mass_on_a_line() -> Arm:
         tip=tip,
         visuals=visuals,
         collisions=visuals,
-        camera=((3.4, 0.7, 1.4), (0.0, 0.0, 0.6)),
+        camera=CAMERAS["mass"],
     )
 
 

@@ -132,7 +132,7 @@ class MotionParams(Params):
     )
 
     target_x: float = knob(
-        0.45,
+        0.4,
         -0.8,
         0.8,
         symbol="p^*_x",
@@ -144,7 +144,7 @@ class MotionParams(Params):
         help="Target of the UR5's tip; or drag the ball in the scene.",
     )
     target_y: float = knob(
-        0.25,
+        -0.35,
         -0.8,
         0.8,
         symbol="p^*_y",
@@ -156,7 +156,7 @@ class MotionParams(Params):
         help="Target of the UR5's tip; or drag the ball in the scene.",
     )
     target_z: float = knob(
-        0.35,
+        0.25,
         0.05,
         1.0,
         symbol="p^*_z",

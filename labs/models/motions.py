@@ -42,7 +42,7 @@ class Motion:
 NEAR = ((1.5, 0.6, 0.95), (0.0, 0.0, 0.72))
 FAR = ((2.6, 1.0, 1.5), (0.0, 0.0, 1.2))
 RAIL = ((2.3, 0.6, 1.1), (0.0, 0.0, 0.75))
-ROBOT = ((1.25, -0.95, 0.85), (0.25, 0.08, 0.36))
+ROBOT = ((1.15, -0.85, 0.8), (0.22, -0.02, 0.33))
 MOTIONS: Mapping[str, Motion] = {
     "pendulum": Motion("Pendulum", (np.pi,), (4.905,), NEAR),
     "double-pendulum": Motion("Double pendulum", (np.pi, 0.0), (19.62, 4.905), FAR),

@@ -75,13 +75,13 @@ class DdpParams(MotionParams):
         group="Solver",
         step=0.01,
         effect="solve",
-        help="Size of the controls guessed at first, u = u_ref + A u_0 cos(2 pi f t).",
+        help="Size of the controls guessed at first, u = u_ref + A u_0 cos(2 pi f_0 t).",
     )
     guess_rate: float = knob(
         0.0,
         0.0,
         2.0,
-        symbol="f",
+        symbol="f_0",
         unit="Hz",
         label="Its frequency",
         group="Solver",
@@ -279,7 +279,7 @@ class Ddp(Lab[DdpParams, DdpState]):
             "rad; m",
             (
                 Line("q", "q"),
-                Line("q_open", r"q\ \text{open loop}", "dash"),
+                Line("q_open", r"q^{\text{open}}", "dash"),
                 Line("q_bar", r"\bar q", "limit"),
             ),
             select="joint",
@@ -326,7 +326,7 @@ class Ddp(Lab[DdpParams, DdpState]):
             "rad/s; m/s",
             (
                 Line("v", "v"),
-                Line("v_open", r"v\ \text{open loop}", "dash"),
+                Line("v_open", r"v^{\text{open}}", "dash"),
                 Line("v_bar", r"\bar v", "limit"),
             ),
             select="joint",
@@ -339,11 +339,11 @@ class Ddp(Lab[DdpParams, DdpState]):
         Readout("missed_open", "Tip off the goal, open loop", "m"),
     )
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
-        "Weak motor": {"limited": True, "limit": 0.3, "guess_rate": 0.85, "guess": 0.3},
+        "Weak motor": {"limited": True, "limit": 0.3, "horizon": 3.0},
         "Cart-pole": {"system": "cart-pole"},
         "Double pendulum": {"system": "double-pendulum"},
-        "Acrobot": {"system": "acrobot", "method": "ilqr"},
-        "Pendubot": {"system": "pendubot", "horizon": 2.0},
+        "Acrobot": {"system": "acrobot", "horizon": 2.5},
+        "Pendubot": {"system": "pendubot"},
         "UR5 reach": {"system": "ur5", "horizon": 1.0, "goal": 3000.0},
         "UR5 with an unknown payload": {
             "system": "ur5",
@@ -362,8 +362,9 @@ class Ddp(Lab[DdpParams, DdpState]):
         problem = _problem(params)
         at = ddp.init(problem, _first_guess(params, problem), params.options)
         if at.stopped:
-            still = first_guess(problem, params.size, 0.0, 0.0)
-            at = replace(at, X=np.tile(problem.x0, (problem.N + 1, 1)), U=still, cost=0.0)
+            X = np.tile(problem.x0, (problem.N + 1, 1))
+            U = first_guess(problem, params.size, 0.0, 0.0)
+            at = replace(at, X=X, U=U, cost=problem.cost.value(X, U))
         plan = Policy(at.X, at.U, at.K, params.h)
         return DdpState(
             plan=plan,
@@ -412,14 +413,14 @@ class Ddp(Lab[DdpParams, DdpState]):
     def edit(
         self, params: DdpParams, handle: str, point: tuple[float, float, float]
     ) -> Mapping[str, Value]:
-        """The ball is the UR5's target."""
+        """The ball is the UR5's target, to the millimetre."""
         if handle != "target":
             return {}
         changes: dict[str, Value] = {}
         for name, value in zip(("target_x", "target_y", "target_z"), point, strict=True):
             tunable = params.tunables[name]
             assert isinstance(tunable, Knob)
-            changes[name] = min(max(float(value), tunable.low), tunable.high)
+            changes[name] = min(max(round(float(value), 3), tunable.low), tunable.high)
         return changes
 
     # The world's clock ------------------------------------------------------------------------

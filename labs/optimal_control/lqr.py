@@ -10,7 +10,7 @@ from labs.algorithms.linear_quadratic import LqrProblem
 from labs.lab import Action, Inputs, Lab, Measurement, Snapshot, State
 from labs.models.linear_systems import STEP, SYSTEMS, Force, LinearSystem, linear_system
 from labs.models.lqr_study import COUNT, HORIZONS, compare
-from labs.models.recovery import CODES, POINTS, ClosedLoop, axes
+from labs.models.recovery import CODES, POINTS, SPAN, ClosedLoop, axes
 from labs.models.regulator import FINALS, POLICIES, Regulator, Setting, regulator, settled
 from labs.params import Params, Value, choice, knob, toggle
 from labs.plots import Curves, Line, Matrix, Readout, TimeSeries, Trace
@@ -186,7 +186,7 @@ class LqrParams(Params):
         help="Of the cart, the pendulum and the mass; the UR5's joints have motors of their own.",
     )
     push_force: float = knob(
-        2.0,
+        1.0,
         0.0,
         200.0,
         symbol="f_{push}",
@@ -366,8 +366,8 @@ class Lqr(Lab[LqrParams, LqrState]):
         Readout("to_end", "Time to go", "s"),
         Readout("growth", "Growth of a small deviation", "a step"),
         Readout("lean", "Largest lean recovered", "rad, m"),
-        Readout("recursions", "Steps of the recursion to P_s", "", whole=True),
-        Readout("settled", "Of N steps, constant gains", "", whole=True),
+        Readout("recursions", "Riccati steps to the steady state", "", whole=True),
+        Readout("settled", "Constant gains, of N", "", whole=True),
     )
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Cart-pole": {},
@@ -523,11 +523,13 @@ class Lqr(Lab[LqrParams, LqrState]):
         closed = opened if law.trouble else np.linalg.eigvals(a + b @ gain).astype(complex)
         known = state.differences > 0.0
         horizons = np.array(HORIZONS[params.system], float)
+        edge = np.array(SPAN.get(params.system, (np.inf, np.inf)))
+        path = np.clip(state.path, -edge, edge)
         found = {
-            "path_x": state.path[:, 0],
-            "path_y": state.path[:, 1],
-            "now_x": state.path[-1:, 0],
-            "now_y": state.path[-1:, 1],
+            "path_x": path[:, 0],
+            "path_y": path[:, 1],
+            "now_x": path[-1:, 0],
+            "now_y": path[-1:, 1],
             "open_re": opened.real,
             "open_im": opened.imag,
             "closed_re": closed.real,
@@ -546,7 +548,7 @@ class Lqr(Lab[LqrParams, LqrState]):
         system = params.linear_system
         world, nq = system.mechanism, system.mechanism.nq
         q, arm = state.x[:nq], system.mechanism.arm
-        scene.camera(*arm.camera)
+        scene.camera(*system.camera)
         scene.arm("rest", arm, system.x_eq[:nq], ghost=True)
         effort = np.abs(state.u) / params.strongest if params.system == "ur5" else None
         scene.arm("system", arm, q, effort=effort)

@@ -34,7 +34,7 @@ def weight_to_motion() -> None:
         scene.skip(2.0)
         times, iterations = [], []
         for k in range(MOVES):
-            weight = round(0.3 * 1.2 ** (k % 11), 3) if k % 2 else 1.0 + k / MOVES
+            weight = 0.3 + 0.02 * k if k % 2 else 1.5 + 0.02 * k
             twin.change({"control": weight})
             iterations.append(_solve(twin))
             path = _on_the_wire(twin)

@@ -122,8 +122,8 @@ def test_a_weak_motor_swings(setting: Setting) -> None:
 @verify("Another guess, another minimum")
 def test_the_ur5_stays_wound_up(setting: Setting) -> None:
     wound, still = solved(setting), solved({**setting, "guess": 0.0})
-    assert state(wound).history.cost[-1] == pytest.approx(0.52, abs=0.01)
-    assert state(still).history.cost[-1] == pytest.approx(0.0035, abs=1e-4)
+    assert state(wound).history.cost[-1] == pytest.approx(0.78, abs=0.005)
+    assert state(still).history.cost[-1] == pytest.approx(0.037, abs=5e-4)
     for world in (wound, still):
         assert done(world).startswith("Converged")
         assert state(world).history.gradient[-1] < 1e-3
@@ -220,6 +220,9 @@ def test_a_diverging_guess_keeps_the_plan_and_says_so() -> None:
 def test_a_diverging_first_guess_leaves_the_robot_at_rest() -> None:
     world = solved({**UR5, "integrator": "explicit-euler", "h": 0.04, "horizon": 3.0, "guess": 1.0})
     assert state(world).failed
+    plan = state(world).plan
+    problem = world.params.problem(plan.N, plan.h)  # type: ignore[attr-defined]
+    assert state(world).history.cost == [problem.cost.value(plan.X, plan.U)]
     for _ in range(20):
         world.advance()
     np.testing.assert_allclose(state(world).runs.x[OPEN_LOOP], state(world).plan.X[0], atol=1e-6)
@@ -257,7 +260,7 @@ def test_a_warm_start_fits_another_horizon_and_step(changes: Setting) -> None:
 
 def test_the_target_follows_the_hand_within_its_range() -> None:
     world = solved(UR5)
-    world.hold("target", (0.3, -0.4, 0.5))
+    world.hold("target", (0.30004, -0.4, 0.5))
     solve(world)
     assert [world.params.target_x, world.params.target_y] == [0.3, -0.4]  # type: ignore[attr-defined]
     tip = mechanism("ur5").tip(state(world).plan.X[-1, :6])

@@ -124,7 +124,7 @@ class LearningParams(TaskParams):
     episodes: float = knob(
         500,
         BATCHES,
-        5000,
+        2000,
         symbol="K",
         unit="",
         label="Episodes",

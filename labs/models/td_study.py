@@ -19,6 +19,7 @@ import numpy as np
 
 from labs.algorithms.experience import Rule
 from labs.algorithms.exploration import Behavior
+from labs.algorithms.sarsa_lambda import FAINT
 from labs.algorithms.td_control import SARSA_LAMBDA, Learners, greedy_costs, init, step
 from labs.models.learning_tasks import Task
 
@@ -90,12 +91,14 @@ def further(
     }
 
 
-def batch(task: Task, methods: Sequence[int], training: Training, most: int) -> int:
+def batch(task: Task, rule: Rule, methods: Sequence[int], training: Training, most: int) -> int:
     """Episodes of the next batch: `most`, or fewer while they are so long that it would take more
     than the budget. Transitions are counted, not seconds: all machines do the same."""
-    pairs, seeds, load = task.q_star.size, training["q"].shape[1], 0.0
+    seeds, load = training["q"].shape[1], 0.0
+    fading = task.mdp.gamma * rule.decay
+    memory = np.log(FAINT) / np.log(fading) if 0.0 < fading < 1.0 else task.q_star.size * fading
     for method, length in zip(methods, training["lengths"], strict=True):
-        traces = min(length, pairs) if method == SARSA_LAMBDA else 0.0
+        traces = min(length, memory, task.q_star.size) if method == SARSA_LAMBDA else 0.0
         load += seeds * length * (STEP + TRACE * traces)
     return int(np.clip(BUDGET / max(load, 1.0), 1, most))
 

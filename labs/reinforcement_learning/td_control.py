@@ -167,7 +167,7 @@ class TdControl(Lab[TdParams, TdState]):
         done = ""
         while not done:
             left = wanted - (trained(training) - begun)
-            episodes = min(left, batch(task, kinds, training, most))
+            episodes = min(left, batch(task, rule, kinds, training, most))
             training, i = further(task, behavior, rule, kinds, training, episodes), i + 1
             if not training["sound"]:
                 done = "The estimates diverged."

@@ -294,6 +294,6 @@ def _smooth(curves: np.ndarray) -> np.ndarray:
 
 def _diverged(training: Training) -> str:
     return (
-        f"The estimates diverged within {trained(training)} episodes: what a trace adds to an "
+        f"The estimates diverged by episode {trained(training)}: what a trace adds to an "
         "estimate overshoots. Take a smaller step size or trace decay, or replacing traces."
     )

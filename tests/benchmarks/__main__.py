@@ -8,6 +8,7 @@ import platform
 from tests.benchmarks import (
     ddp,
     dynamic_programming,
+    frames,
     headless,
     latency,
     load,
@@ -26,6 +27,7 @@ MEASURES = {
     "slider": latency.slider_to_telemetry,
     "scene": latency.slider_to_scene,
     "resolve": resolve.weight_to_motion,
+    "frames": frames.while_solving,
     "page": latency.page_to_motion,
     "twelve": load.twelve,
     "growing": load.growing,

@@ -102,8 +102,9 @@ class Lab(abc.ABC, Generic[P, S]):
         """The state one `period` later."""
         raise NotImplementedError
 
-    def solve(self, params: P, state: S) -> Iterator[Snapshot]:
-        """Yields after every iteration of the solver, the last with `done` set."""
+    def solve(self, params: P, state: S) -> Iterator[Snapshot | None]:
+        """Yields after every iteration of the solver, the last with `done` set; None in the midst
+        of an iteration that takes more than some milliseconds, so that the scene keeps moving."""
         raise NotImplementedError
 
     def accept(self, params: P, state: S, snapshot: Snapshot) -> S:

@@ -44,7 +44,7 @@ class World:
 
     shown: Snapshot | None
     """What the state holds of the solver; None until there is something."""
-    _solver: Iterator[Snapshot] | None
+    _solver: Iterator[Snapshot | None] | None
 
     def __init__(
         self,
@@ -82,7 +82,7 @@ class World:
             raise LabError(f"{self.entry.slug!r} has no solver: there is nothing to load")
         params = lab.Params().change(solution.params)
         state = lab.init(params, np.random.default_rng(solution.seed))
-        own = list(islice(lab.solve(params, state), 2))
+        own = list(islice(filter(None, lab.solve(params, state)), 2))
         if not own:
             raise LabError("with these parameters the solver finds nothing to compare with")
         snapshot = solution.snapshot(own)
@@ -195,19 +195,29 @@ class World:
     def iterate(self) -> None:
         """One iteration of the solver, taken into the state: from the latest on, wherever one
         looked back to."""
+        while not self.work():
+            pass
+
+    def work(self) -> bool:
+        """A piece of an iteration, where the solver does it in pieces; whether that ended it."""
         if self._solver is None:
-            return
-        snapshot = next(self._solver, None)
-        if snapshot is None or snapshot.done:
+            return True
+        try:
+            snapshot = next(self._solver)
+        except StopIteration:
             self._solver = None
+            return True
         if snapshot is None:
-            return
+            return False
+        if snapshot.done:
+            self._solver = None
         if self.latest and self.shown is not self.latest:
             self._accept(self.latest)
         snapshot = replace(snapshot, iteration=self._before + snapshot.iteration)
         self.kept.add(snapshot)
         self._accept(snapshot)
         self._note(Event(self.steps, "solve", "iterate", 1))
+        return True
 
     def show(self, iteration: int) -> None:
         """Looks back at an iteration: the nearest kept one not after it. Raises ParameterError."""

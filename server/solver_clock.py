@@ -25,6 +25,8 @@ class SolverClock:
         self.pace: float = told["pace"] if told else 0.0
         self._owed = 0
         """Iterations to do although paused."""
+        self._midway = False
+        """Whether an iteration has begun and not ended."""
         self._next = 0.0
         """When the next one is due [s, wall clock]."""
         self._begin(0.0)
@@ -37,6 +39,7 @@ class SolverClock:
         """The solver was started anew."""
         self._solves = self._world.solves
         self._owed = 0
+        self._midway = False
         self._next = 0.0
         self._active = False
         self._last = now
@@ -73,15 +76,17 @@ class SolverClock:
         self.pace, self._next = pace, 0.0
 
     def iterate(self, now: float, until: float) -> None:
-        """What is due: one iteration at least, and no further one begins after `until`."""
+        """What is due: one piece of an iteration at least, and none begins after `until`."""
         world = self._world
         self._follow(now)
         if self._active:
             self._spent += now - self._last
         self._last = now
         self._active = world.solving and (self.running or self._owed > 0)
-        while world.solving and self._is_due(now):
-            world.iterate()
+        while world.solving and (self._owed or self._is_due(now)):
+            self._midway = not world.work()
+            if self._owed and not self._midway:
+                self._owed -= 1
             if time.perf_counter() > until:
                 break
 
@@ -103,11 +108,8 @@ class SolverClock:
         )
 
     def _is_due(self, now: float) -> bool:
-        if self._owed:
-            self._owed -= 1
-            return True
-        if not self.running:
-            return False
+        if not self.running or self._midway:
+            return self.running
         if self.pace:
             if now < self._next:
                 return False

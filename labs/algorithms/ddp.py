@@ -27,11 +27,14 @@ import numpy as np
 from labs.algorithms.ddp_sweep import backward_pass
 from labs.algorithms.optimal_control import (
     Model,
+    Pieces,
     Problem,
     diverges_at,
     expand,
     rollout,
     steepness,
+    timed,
+    whole,
 )
 from labs.errors import LabError
 
@@ -127,11 +130,19 @@ def init(problem: Problem, U: np.ndarray, options: Options) -> Iterate:
 
 def step(problem: Problem, options: Options, at: Iterate) -> Iterate:
     """One iteration: expansion, backward pass, line search. What has stopped stays as it is."""
+    return whole(step_in_pieces(problem, options, at))
+
+
+def step_in_pieces(problem: Problem, options: Options, at: Iterate) -> Pieces[Iterate]:
+    """The same, pausing between pieces of some milliseconds."""
     if at.stopped:
         return at
+    seconds = {"derivatives": 0.0, "backward": 0.0, "forward": 0.0}
+    model = at.model
+    if model is None:
+        expansion = expand(problem, at.X, at.U, options.second_order)
+        model = yield from timed(expansion, seconds, "derivatives")
     begun = perf_counter()
-    model = at.model or expand(problem, at.X, at.U, options.second_order)
-    expanded = perf_counter()
     found = _direction(problem, options, model, at)
     at = replace(
         at,
@@ -145,20 +156,16 @@ def step(problem: Problem, options: Options, at: Iterate) -> Iterate:
         alpha=0.0,
         model=model,
     )
-    swept = perf_counter()
+    seconds["backward"] = perf_counter() - begun
     if found.failed:
         at = replace(at, stopped=found.failed)
     elif -at.expected <= options.tolerance * abs(at.cost):
         at = replace(at, converged=True, stopped=_farewell(at))
     else:
-        at = _search(problem, options, at, found.d_1, found.d_2)
+        search = _search(problem, options, at, found.d_1, found.d_2)
+        at = yield from timed(search, seconds, "forward")
         if not at.stopped and at.iteration >= options.iterations:
             at = replace(at, stopped=_unfinished(at))
-    seconds = {
-        "derivatives": expanded - begun,
-        "backward": swept - expanded,
-        "forward": perf_counter() - swept,
-    }
     return replace(at, seconds=seconds)
 
 
@@ -222,7 +229,9 @@ def _direction(problem: Problem, options: Options, model: Model, at: Iterate) ->
     return Direction(w, K, mu, d_1, d_2)
 
 
-def _search(problem: Problem, options: Options, at: Iterate, d_1: float, d_2: float) -> Iterate:
+def _search(
+    problem: Problem, options: Options, at: Iterate, d_1: float, d_2: float
+) -> Pieces[Iterate]:
     """The line search, and mu for the next iteration."""
     more = max(at.mu * options.mu_factor, SMALLEST_MU)
     diverged = 0
@@ -231,6 +240,7 @@ def _search(problem: Problem, options: Options, at: Iterate, d_1: float, d_2: fl
         expected = alpha * d_1 + 0.5 * alpha**2 * d_2
         X, U, cost = rollout(problem, at.X, at.U + alpha * at.w, at.K)
         diverged += not np.isfinite(cost)
+        yield
         unseen = max(abs(expected), abs(cost - at.cost)) <= ROUNDING * abs(at.cost)
         ratio = 1.0 if unseen else (cost - at.cost) / expected
         if expected < 0.0 and ratio > options.c1:

@@ -6,13 +6,17 @@ Here are the interfaces of f and J, their expansion about a trajectory, the roll
 and the gradient dJ/dU.
 """
 
+from collections.abc import Generator
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from time import perf_counter
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
 from labs.algorithms.ddp_sweep import costate
 from labs.errors import LabError
+
+T = TypeVar("T")
 
 FARTHEST = 1e6
 """A state beyond this, in its units, has diverged."""
@@ -91,14 +95,44 @@ class Model(NamedTuple):
     cost: CostDerivatives
 
 
-def expand(problem: Problem, X: np.ndarray, U: np.ndarray, second_order: bool) -> Model:
+Pieces = Generator[None, None, T]
+"""Work that pauses now and then, so that something else can be done in between."""
+
+
+def whole(pieces: Pieces[T]) -> T:
+    """All of it at once."""
+    while True:
+        try:
+            next(pieces)
+        except StopIteration as end:
+            result: T = end.value
+            return result
+
+
+def timed(pieces: Pieces[T], seconds: dict[str, float], phase: str) -> Pieces[T]:
+    """Adds up in seconds[phase] what the pieces take, without the pauses."""
+    while True:
+        begun = perf_counter()
+        try:
+            next(pieces)
+        except StopIteration as end:
+            result: T = end.value
+            return result
+        finally:
+            seconds[phase] += perf_counter() - begun
+        yield
+
+
+def expand(problem: Problem, X: np.ndarray, U: np.ndarray, second_order: bool) -> Pieces[Model]:
     """The derivatives of dynamics and cost along a trajectory."""
     _, A, B = problem.dynamics.linearize(X, U)
-    second = second_derivatives(problem.dynamics, X, U) if second_order else np.empty((0, 0, 0, 0))
+    second = np.empty((0, 0, 0, 0))
+    if second_order:
+        second = yield from second_derivatives(problem.dynamics, X, U)
     return Model(A, B, second, problem.cost.derivatives(X, U, second_order))
 
 
-def second_derivatives(dynamics: Dynamics, X: np.ndarray, U: np.ndarray) -> np.ndarray:
+def second_derivatives(dynamics: Dynamics, X: np.ndarray, U: np.ndarray) -> Pieces[np.ndarray]:
     """f'' (N, nx, nx + nu, nx + nu) over (x, u), by central differences of the analytical f_x and
     f_u: Pinocchio has no second derivatives of forward dynamics. The error is some 1e-9 of f''."""
     N, n, m = len(U), dynamics.nx, dynamics.nu
@@ -106,6 +140,7 @@ def second_derivatives(dynamics: Dynamics, X: np.ndarray, U: np.ndarray) -> np.n
     for k in range(n + m):
         point = np.concatenate([X[:N], U], axis=1)
         eps = 1e-5 * np.maximum(1.0, np.abs(point[:, k]))
+        yield
         sides = []
         for sign in (1.0, -1.0):
             moved = point.copy()

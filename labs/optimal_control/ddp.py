@@ -377,7 +377,7 @@ class Ddp(Lab[DdpParams, DdpState]):
 
     # The solver's clock -----------------------------------------------------------------------
 
-    def solve(self, params: DdpParams, state: DdpState) -> Iterator[Snapshot]:
+    def solve(self, params: DdpParams, state: DdpState) -> Iterator[Snapshot | None]:
         """One iteration of DDP a snapshot. A first guess that diverges leaves what there was."""
         problem = _problem(params)
         at = ddp.init(problem, _start(params, problem, state), params.options)
@@ -387,7 +387,7 @@ class Ddp(Lab[DdpParams, DdpState]):
         history = History.begun(at, *_path(params, at), state.history)
         seconds = {phase: np.zeros(0) for phase in PHASES}
         while not at.stopped:
-            at = ddp.step(problem, params.options, at)
+            at = yield from ddp.step_in_pieces(problem, params.options, at)
             history = history.after(at, *_path(params, at))
             seconds = {name: np.append(seconds[name], at.seconds[name]) for name in PHASES}
             plan = Policy(at.X, at.U, at.K, params.h)

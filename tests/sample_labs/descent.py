@@ -47,9 +47,10 @@ class Descent(Lab[DescentParams, DescentState]):
     def init(self, params: DescentParams, rng: np.random.Generator) -> DescentState:
         return DescentState()
 
-    def solve(self, params: DescentParams, state: DescentState) -> Iterator[Snapshot]:
+    def solve(self, params: DescentParams, state: DescentState) -> Iterator[Snapshot | None]:
         begun, path = time.perf_counter(), state.path
         for k in range(1, round(params.many) + 1):
+            yield None  # an iteration of two pieces
             path = np.vstack([path, path[-1] - params.rate * BOWL * path[-1]])
             x = path[-1]
             data = {

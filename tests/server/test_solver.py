@@ -95,6 +95,29 @@ def test_steps_that_are_owed_end_with_their_solver() -> None:
     assert world.kept.iterations == [1, 2, 3]
 
 
+def test_an_iteration_in_pieces_is_one_iteration() -> None:
+    world = World(find("descent"))
+    clock = SolverClock(world, {"running": False, "pace": 0.0})
+    clock.obey("step", count=2)
+    found = []
+    for _ in range(6):
+        clock.iterate(1.0, until=0.0)  # a piece at a time
+        found.append(world.latest.iteration if world.latest else 0)
+    assert found == [0, 1, 1, 2, 2, 2]
+    clock.obey("run")
+    clock.iterate(1.0, until=0.0)
+    clock.obey("show", iteration=1)
+    for _ in range(3):
+        clock.iterate(1.0, until=0.0)
+    assert world.shown is world.kept.at(1), "what is looked at stays, in the midst of another"
+    clock.obey("pace", pace=1.0)
+    clock.obey("run")
+    for _ in range(9):
+        clock.iterate(2.0, until=0.0)
+    assert world.latest is not None
+    assert world.latest.iteration == 4, "the one that had begun, and the one that was due"
+
+
 # Live -----------------------------------------------------------------------------------------
 
 

@@ -9,7 +9,7 @@ import pytest
 from labs.algorithms import ddp
 from labs.algorithms.ddp import Options
 from labs.algorithms.ddp_sweep import backward_pass
-from labs.algorithms.optimal_control import Problem, expand, rollout
+from labs.algorithms.optimal_control import Problem, expand, rollout, whole
 from labs.errors import LabError
 from labs.models.discrete import Discrete
 from labs.models.mechanisms import mechanism
@@ -121,7 +121,7 @@ def test_a_linear_quadratic_problem_takes_one_step_to_riccati(second_order: bool
 def test_the_expected_change_holds_for_every_alpha_where_the_model_is_exact() -> None:
     p, options = linear_quadratic(), Options()
     at = ddp.init(p, np.ones((30, 2)), options)
-    model = expand(p, at.X, at.U, second_order=False)
+    model = whole(expand(p, at.X, at.U, second_order=False))
     w, K = np.empty_like(at.w), np.empty_like(at.K)
     none = np.empty((0, 0))
     where, d_1, d_2 = backward_pass(

@@ -10,6 +10,7 @@ from labs.algorithms.optimal_control import (
     rollout,
     second_derivatives,
     steepness,
+    whole,
 )
 from labs.errors import LabError
 from labs.models.discrete import Discrete
@@ -95,7 +96,7 @@ def test_second_derivatives_are_those_of_the_dynamics(name: str, method: str) ->
     p = problem(name, method=method)
     n, m = p.dynamics.nx, p.dynamics.nu
     X, U = RNG.normal(size=(7, n)), RNG.normal(size=(6, m))
-    second = second_derivatives(p.dynamics, X, U)
+    second = whole(second_derivatives(p.dynamics, X, U))
     np.testing.assert_array_equal(second, second.transpose(0, 1, 3, 2))
     eps = 1e-3
     for t in range(6):
@@ -119,7 +120,7 @@ def test_the_gradient_by_the_costate_is_that_of_finite_differences(name: str) ->
         ahead = simulated(p, moved)[2]
         moved[index] -= 2 * eps
         slopes[index] = (ahead - simulated(p, moved)[2]) / (2 * eps)
-    found = steepness(p, expand(p, X, U, second_order=False), U)
+    found = steepness(p, whole(expand(p, X, U, second_order=False)), U)
     assert found == pytest.approx(np.abs(slopes).max(), rel=1e-6)
 
 
@@ -130,7 +131,7 @@ def test_a_gradient_that_pushes_against_the_bound_does_not_count() -> None:
     downhill = -np.sign(simulated(p, U + 1e-4)[2] - J)
     U[0, 0] = downhill * 1e-3
     X, U, _ = simulated(p, U)
-    model = expand(p, X, U, second_order=False)
+    model = whole(expand(p, X, U, second_order=False))
     free = steepness(p, model, U)
     bounded = Problem(p.dynamics, p.cost, p.x0, 1, bound=np.array([1e-3]))
     wider = Problem(p.dynamics, p.cost, p.x0, 1, bound=np.array([2e-3]))

@@ -33,7 +33,9 @@ def solve(problem: LqrProblem) -> LqrPolicy:
     size = n if problem.homogeneous else n + 1
     gains, values = np.zeros((steps, m, size)), np.zeros((steps + 1, size, size))
     values[steps] = terms["q_final"][0]
-    failed = _backward(terms["a"], terms["b"], terms["q"], terms["r"], terms["s"], values, gains)
+    # Compiled for one layout of memory: another one would be compiled while somebody waits.
+    a, b, q, r, s = (np.ascontiguousarray(terms[name]) for name in "abqrs")
+    failed = _backward(a, b, q, r, s, values, gains)
     if failed >= 0:
         raise LabError(
             f"P grows beyond all numbers {steps - failed} steps before the end of N = {steps}: "

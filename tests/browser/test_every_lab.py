@@ -36,7 +36,8 @@ def test_a_slider_of_every_lab_moves_its_parameter(page: Page, slug: str) -> Non
         if tunable["kind"] == "knob" and tunable["scale"] == "linear"
     )
     unit = f" [{knob['unit']}]" if knob["unit"] else ""
-    value = knob["low"] + 0.75 * (knob["high"] - knob["low"])
+    value = 0.75 * (knob["high"] - knob["low"])
+    value = knob["low"] + (round(value / knob["step"]) * knob["step"] if knob["step"] else value)
     box = lab.row(f"{knob['label']}{unit}").get_by_role("textbox")
     box.fill(f"{value:.2f}")
     box.press("Enter")

@@ -246,7 +246,7 @@ class Params(BaseModel):
             return f"{shown}: {name} takes one of {', '.join(map(str, tunable.options))}"
         if isinstance(tunable, Text):
             why = error["msg"].removeprefix("Value error, ")
-            return f"{shown}: {why}"
+            return f"{name}: {why}"
         return f"{shown}: {name} takes true or false"
 
 

@@ -209,7 +209,7 @@ class Texts(Params):
 @pytest.mark.parametrize(("name", "most"), [("short", 400), ("long", 4000)])
 def test_a_text_has_a_length(name: str, most: int) -> None:
     assert getattr(Texts().change({name: "é" * most}), name) == "é" * most
-    with pytest.raises(ParameterError, match=f"{name} = .*at most {most} characters"):
+    with pytest.raises(ParameterError, match=f"{name}: .*at most {most} characters"):
         Texts().change({name: "é" * (most + 1)})
     described = {tunable["name"]: tunable["most"] for tunable in Texts.describe()}
     assert described[name] == most

@@ -9,13 +9,13 @@ from tests.served import Served
 from tests.viser_client import SceneClient
 
 WORK: Mapping[str, tuple[str, Mapping[str, Value]]] = {
-    "Q-learning and SARSA, pendulum": ("td-control", {"world": "pendulum", "episodes": 5000.0}),
-    "Q-learning and SARSA, cliff": ("td-control", {"episodes": 5000.0}),
+    "Q-learning and SARSA, pendulum": ("td-control", {"system": "pendulum", "episodes": 2000.0}),
+    "Q-learning and SARSA, cliff": ("td-control", {"episodes": 2000.0}),
     "value iteration, pendulum": (
         "dynamic-programming",
         {"world": "pendulum", "nodes": 101.0, "gamma": 0.995},
     ),
-    "swing-up by DDP, f'' and all": ("ddp", {"system": "acrobot", "second_order": True}),
+    "UR5 reach by DDP, with f''": ("ddp", {"system": "ur5", "method": "ddp"}),
 }
 
 

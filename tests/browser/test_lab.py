@@ -211,6 +211,13 @@ def test_curves_are_named_and_can_be_hidden(page: Page) -> None:
     expect(chart.locator("polyline")).to_have_count(1)
 
 
+def test_what_has_no_curve_is_faint_in_the_legend(page: Page) -> None:
+    LabPage(page).open("lqr-tracking", "?robot=cart-pole")
+    legend = page.get_by_role("region", name="Affine term over the preview").locator(".legend")
+    expect(legend.locator("button")).to_have_count(6)
+    expect(legend.locator("button.nothing")).to_have_count(5)
+
+
 def test_a_text_is_edited_and_a_wrong_one_stays_to_be_put_right(page: Page) -> None:
     lab = LabPage(page).open("integration")
     field = lab.value("tableau")

@@ -11,7 +11,7 @@ export class Curves {
     Object.assign(this, card(plot.title, "", "canvas tall"));
     this.hidden = new Set(); // labels switched off
     this.notes = new Map();
-    for (const trace of plot.traces) if (trace.label) this.legend.append(this.entry(trace));
+    this.entries = plot.traces.map((trace) => (trace.label ? this.legend.appendChild(this.entry(trace)) : null));
     this.chart = new Chart(this.body, () => this.draw());
   }
 
@@ -43,6 +43,7 @@ export class Curves {
       const place = (v, log) => (log ? Math.log10(v) : v); // of what is not positive: not finite
       return xs.map((v, i) => [place(v, logX), place(ys[i], logY)]).filter(([a, b]) => Number.isFinite(a) && Number.isFinite(b));
     });
+    this.data.forEach((points, i) => this.entries[i]?.classList.toggle("nothing", points.length === 0));
     for (const [note, name] of this.notes) {
       const [value] = fields[name]?.flat() ?? [];
       note.textContent = Number.isFinite(value) ? number(value) : "";

@@ -33,7 +33,7 @@ export class SolverRow {
   }
 
   toggle() {
-    if (this.row) this.send({ command: this.status?.running ? "solver_pause" : "solver_run" });
+    if (this.row) this.send({ command: (this.status?.running ?? true) ? "solver_pause" : "solver_run" });
   }
 
   step() {

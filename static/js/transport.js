@@ -29,7 +29,8 @@ export class Transport {
     if (!this.run) return null;
     // After trouble the world waits for a reset; to run means to begin anew.
     if (this.status?.trouble) return this.send({ command: "reset" }).then(() => this.send({ command: "run" }));
-    return this.send({ command: this.status?.running ? "pause" : "run" });
+    // What one looks at runs, unless it has said otherwise.
+    return this.send({ command: (this.status?.running ?? true) ? "pause" : "run" });
   }
 
   slide() {

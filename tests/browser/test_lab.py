@@ -161,6 +161,8 @@ def test_everything_goes_by_keyboard(page: Page) -> None:
     expect(page.get_by_role("dialog")).to_be_visible()
     page.keyboard.press("Escape")
     expect(page.get_by_role("dialog")).to_be_hidden()
+    expect(page.locator("#run")).to_have_attribute("aria-pressed", "true")
+    page.locator("h1").click()
     page.keyboard.press("Space")
     expect(page.locator("#run")).to_have_text(re.compile("Run"))
     page.keyboard.press("r")

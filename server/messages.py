@@ -190,6 +190,8 @@ class Hello(Message):
     """First on every stream, and again after a worker was replaced."""
 
     type: Literal["hello"] = "hello"
+    worker: int
+    """Which process speaks: another one has another scene."""
     columns: list[str]
     """Names of a telemetry row's entries: "t", then channels; a vector's are "q[0]", "q[1]"."""
     period: float

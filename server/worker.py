@@ -297,7 +297,8 @@ class Live:
         return True
 
     def _hello(self) -> None:
-        hello = Hello(columns=self.world.recorder.columns, period=self.world.lab.period)
+        columns = self.world.recorder.columns
+        hello = Hello(worker=os.getpid(), columns=columns, period=self.world.lab.period)
         self.link.send(HELLO, hello.model_dump())
 
     def _telemetry(self, now: float) -> None:

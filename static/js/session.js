@@ -72,6 +72,7 @@ export class Session extends EventTarget {
 
   begin(info) {
     this.info = info;
+    this.worker = null;
     this.tries = 0;
     this.tell("phase", { phase: "robot", text: "" });
     this.showScene();
@@ -86,7 +87,6 @@ export class Session extends EventTarget {
   }
 
   listen() {
-    let hellos = 0;
     const socket = new WebSocket(location.origin.replace(/^http/, "ws") + this.info.stream);
     this.socket = socket;
     this.heard = performance.now();
@@ -95,13 +95,19 @@ export class Session extends EventTarget {
       this.heard = performance.now();
       const message = JSON.parse(event.data);
       if (message.type === "status") this.noteStatus(message);
-      if (message.type === "hello" && hellos++ > 0) this.showScene(); // of the worker that took over
+      if (message.type === "hello") this.meet(message.worker);
       this.tell(message.type, message);
       if (message.type === "notice" && message.state === "ended") this.rest(message.text);
     };
     socket.onclose = () => {
       if (socket === this.socket) this.reconnect();
     };
+  }
+
+  // A worker that took over has a scene of its own; one that says hello again has not.
+  meet(worker) {
+    if (this.worker && worker !== this.worker) this.showScene();
+    this.worker = worker;
   }
 
   noteStatus(status) {

@@ -60,10 +60,7 @@ def page(context: BrowserContext) -> Iterator[Page]:
     """A page that must not complain: any script error fails the test."""
     page = context.new_page()
     errors: list[str] = []
-    # On a busy machine the viewer in the scene's frame, not a script of ours, has now and then
-    # complained of a missing container while it started; the scene worked all the same.
-    viewers = "Minified React error #299"
-    page.on("pageerror", lambda e: None if viewers in str(e) else errors.append(str(e)))
+    page.on("pageerror", lambda error: errors.append(str(error)))
     yield page
     page.close()
     assert not errors

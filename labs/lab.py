@@ -2,7 +2,7 @@
 
 A lab is one idea of the course as a small world: parameters the user turns, a state that
 evolves, numbers to plot and things to draw. The same object runs live behind a page and
-headless under `labs.run`, bit for bit the same.
+headless under `labs.engine.run`, bit for bit the same.
 """
 
 import abc

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from labs.models.arms import Arm
+from labs.shapes import Body
 
 Color = Literal["actual", "reference", "force", "warning", "muted"]
 
@@ -26,7 +26,7 @@ class Scene(Protocol):
     def arm(
         self,
         name: str,
-        arm: Arm,
+        arm: Body,
         q: np.ndarray,
         *,
         ghost: bool = False,
@@ -126,7 +126,7 @@ class NullScene:
     def arm(
         self,
         name: str,
-        arm: Arm,
+        arm: Body,
         q: np.ndarray,
         *,
         ghost: bool = False,

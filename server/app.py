@@ -14,10 +14,10 @@ from starlette.background import BackgroundTask
 from starlette.exceptions import HTTPException
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from labs.catalog import catalog, find
+from labs.engine.catalog import catalog, find
+from labs.engine.record import versions
 from labs.errors import LabError, UnknownLab
 from labs.params import Params
-from labs.record import versions
 from server import pages, proxy
 from server.guard import Guard
 from server.messages import (

@@ -26,7 +26,7 @@ from markdown_it.token import Token
 from markdown_it.utils import OptionsDict
 from mdit_py_plugins.dollarmath import dollarmath_plugin
 
-from labs.catalog import Entry
+from labs.engine.catalog import Entry
 from labs.errors import LabError
 from labs.params import Params, Value
 

@@ -11,12 +11,14 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from labs.catalog import catalog, find
+from labs.engine.catalog import catalog, find
+from labs.engine.events import Event, events_of, parse_event
+from labs.engine.headless import run
+from labs.engine.record import versions
+from labs.engine.run import World
+from labs.engine.solution import FORMS as SOLUTION_FORMS
+from labs.engine.solution import Solution
 from labs.errors import LabError
-from labs.record import versions
-from labs.run import Event, World, events_of, parse_event, run
-from labs.solution import FORMS as SOLUTION_FORMS
-from labs.solution import Solution
 
 FORMS = ("json", "csv", "npz")
 

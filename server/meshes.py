@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from labs.models.arms import Box, Cylinder, Sphere, Visual
+from labs.shapes import Box, Cylinder, Sphere, Visual
 
 Triangles = tuple[np.ndarray, np.ndarray]
 """Vertices (k, 3) [m] and faces (m, 3)."""

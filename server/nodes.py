@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio as pin
 import viser
 
-from labs.models.arms import Arm, Visual
 from labs.scene import Color
+from labs.shapes import Body, Visual
 from server import meshes
 from server.messages import View
 
@@ -74,7 +74,7 @@ class ArmNode(Node):
     """An arm: a node a joint, nested as the joints are, with its pieces fixed to them."""
 
     def __init__(
-        self, server: viser.ViserServer, name: str, arm: Arm, ghost: bool, view: View
+        self, server: viser.ViserServer, name: str, arm: Body, ghost: bool, view: View
     ) -> None:
         self._scene = server.scene
         super().__init__(self._scene.add_frame(f"/{name}", show_axes=False))

@@ -16,7 +16,7 @@ from markupsafe import Markup
 from starlette.types import Scope
 
 from labs import plots
-from labs.catalog import Entry, catalog
+from labs.engine.catalog import Entry, catalog
 from labs.params import Params
 from server.articles import render, tex, words
 

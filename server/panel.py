@@ -9,9 +9,9 @@ from typing import Any
 
 import viser
 
+from labs.engine.run import World
 from labs.lab import Action
 from labs.params import Choice, Knob, Params, Text, Tunable, Value
-from labs.run import World
 from server.mailbox import Mailbox
 
 Show = Callable[[Value], None]

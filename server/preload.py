@@ -5,7 +5,7 @@ import os
 import threading
 
 import server.worker  # noqa: F401  (imports Viser, Pinocchio and all labs' code)
-from labs.catalog import catalog
+from labs.engine.catalog import catalog
 from labs.models.arms import ARMS, load
 from server import meshes
 

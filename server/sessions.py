@@ -9,7 +9,7 @@ from typing import Any
 
 import orjson
 
-from labs.catalog import Entry
+from labs.engine.catalog import Entry
 from labs.errors import LabError
 from labs.params import Params
 from server.messages import NewSession, Notice, SessionInfo

@@ -4,8 +4,8 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
+from labs.engine.run import World
 from labs.errors import LabError
-from labs.run import World
 from server.messages import SolverStatus
 
 MOST_OWED = 1000

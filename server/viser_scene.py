@@ -13,9 +13,9 @@ import pinocchio as pin
 import viser
 from numpy.typing import ArrayLike
 
-from labs.models.arms import Arm
-from labs.run import World
+from labs.engine.run import World
 from labs.scene import Color
+from labs.shapes import Body
 from server import meshes
 from server.boards import CellsNode, SurfaceNode
 from server.mailbox import Mailbox
@@ -94,7 +94,7 @@ class ViserScene:
     def arm(
         self,
         name: str,
-        arm: Arm,
+        arm: Body,
         q: np.ndarray,
         *,
         ghost: bool = False,

@@ -20,11 +20,11 @@ from typing import Any
 import numpy as np
 import viser
 
-from labs.catalog import find
+from labs.engine.catalog import find
+from labs.engine.run import World
+from labs.engine.solution import Solution
 from labs.errors import LabError
 from labs.plots import pictured
-from labs.run import World
-from labs.solution import Solution
 from server.mailbox import Item, Mailbox
 from server.messages import Hello, Status, Telemetry, View
 from server.panel import Panel

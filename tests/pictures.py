@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 from PIL import Image
 from playwright.sync_api import Page, sync_playwright
 
-from labs.catalog import find
+from labs.engine.catalog import find
 from tests import chromium
 from tests.served import Served
 
@@ -77,8 +77,7 @@ def _card(shot: Image.Image) -> Image.Image:
 
 
 def _beside_article(slug: str) -> Path:
-    entry = find(slug)
-    return Path(*entry.package.split(".")) / f"{slug.replace('-', '_')}.webp"
+    return find(slug).folder / "card.webp"
 
 
 if __name__ == "__main__":

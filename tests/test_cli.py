@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labs.catalog import catalog
-from labs.record import versions
-from labs.run import run
+from labs.engine.catalog import catalog
+from labs.engine.headless import run
+from labs.engine.record import versions
 from server.cli import main
 
 

@@ -20,7 +20,7 @@ USE = """
 import importlib, json, pkgutil, sys
 from starlette.testclient import TestClient
 import labs, server
-from labs.catalog import catalog
+from labs.engine.catalog import catalog
 from server.app import create_app
 from server.settings import Settings
 
@@ -73,9 +73,9 @@ def test_the_wheel_holds_every_file_of_the_packages_and_nothing_else(wheel: Path
 @pytest.mark.parametrize(
     "name",
     [
-        "labs/catalog.py",
-        "labs/reactive_control/joint_control.py",
-        "labs/reactive_control/joint_control.md",
+        "labs/engine/catalog.py",
+        "labs/reactive_control/joint_control/lab.py",
+        "labs/reactive_control/joint_control/article.md",
         "server/app.py",
         "static/templates/home.html",
         "static/css/base.css",

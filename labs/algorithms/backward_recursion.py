@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labs.algorithms.bellman import optimal_backup
-from labs.models.finite_mdp import FiniteMDP
+from labs.problems.finite_mdp import FiniteMDP
 
 
 @dataclass(frozen=True, eq=False)

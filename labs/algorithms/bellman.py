@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labs.algorithms.compiled import compiled
-from labs.models.finite_mdp import FiniteMDP
+from labs.compiled import compiled
+from labs.problems.finite_mdp import FiniteMDP
 
 TIE = 1e-12
 """Relative to 1 + |Q|: controls this close are equally good, and the present one is kept."""

@@ -25,7 +25,8 @@ from typing import NamedTuple
 import numpy as np
 
 from labs.algorithms.ddp_sweep import backward_pass
-from labs.algorithms.optimal_control import (
+from labs.errors import LabError
+from labs.problems.optimal_control import (
     Model,
     Pieces,
     Problem,
@@ -36,7 +37,6 @@ from labs.algorithms.optimal_control import (
     timed,
     whole,
 )
-from labs.errors import LabError
 
 SMALLEST_MU = 1e-8
 """[unit of Q_uu] below this the regularisation is zero."""

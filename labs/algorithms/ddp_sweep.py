@@ -19,7 +19,7 @@ and Todorov, "Control-limited differential dynamic programming", 2014).
 
 import numpy as np
 
-from labs.algorithms.compiled import compiled
+from labs.compiled import compiled
 
 NEWTON, HALVINGS = 50, 30
 """At most, of the projected Newton method and of its line search."""

@@ -19,8 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labs.algorithms.compiled import compiled, copied
-from labs.algorithms.random_numbers import below, uniform
+from labs.compiled import compiled, copied
+from labs.random_numbers import below, uniform
 
 EPSILON_GREEDY, BOLTZMANN, CONFIDENCE, FOLLOW = range(4)
 

@@ -12,8 +12,8 @@ N (n + m) rows and N m columns, solved by a QR decomposition, which takes O(N^3)
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from labs.algorithms.linear_quadratic import LqrProblem
 from labs.errors import LabError
+from labs.problems.linear_quadratic import LqrProblem
 
 LARGEST = 40_000_000
 """Entries of a matrix worth building: 320 MB."""

@@ -19,9 +19,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labs.algorithms.linear_quadratic import LqrPolicy, LqrProblem
 from labs.algorithms.riccati import solve
 from labs.errors import LabError
+from labs.problems.linear_quadratic import LqrPolicy, LqrProblem
 
 TOLERANCE, MOST = 1e-9, 400
 """Laps end when P_0 and p_0 change by less than this share of their largest entries; how many."""

@@ -17,8 +17,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from labs.algorithms.bellman import Sweep, converged, policy_backup, until_done
-from labs.algorithms.compiled import compiled
-from labs.models.finite_mdp import FiniteMDP
+from labs.compiled import compiled
+from labs.problems.finite_mdp import FiniteMDP
 
 
 def init(V: np.ndarray, policy: np.ndarray) -> Sweep:

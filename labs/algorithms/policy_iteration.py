@@ -19,7 +19,7 @@ import numpy as np
 from labs.algorithms.bellman import Sweep, converged, optimal_backup, policy_backup, until_done
 from labs.algorithms.policy_evaluation import exact
 from labs.errors import LabError
-from labs.models.finite_mdp import FiniteMDP
+from labs.problems.finite_mdp import FiniteMDP
 
 MOST = 10_000
 """Improvements at most in `optimum`."""

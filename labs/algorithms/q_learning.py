@@ -6,9 +6,9 @@ with Q = 0 in terminal states. Whoever chose u, the target is that of the best c
 
 import numpy as np
 
-from labs.algorithms.compiled import compiled
-from labs.algorithms.experience import Problem, Rule, begin, least, step_size, transition
 from labs.algorithms.exploration import Behavior, choose
+from labs.compiled import compiled
+from labs.problems.episodes import Problem, Rule, begin, least, step_size, transition
 
 
 @compiled

@@ -19,10 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
-from labs.algorithms.compiled import compiled
-from labs.algorithms.linear_quadratic import LqrPolicy, LqrProblem
 from labs.algorithms.stabilizability import require_detectable, require_stabilizable
+from labs.compiled import compiled
 from labs.errors import LabError
+from labs.problems.linear_quadratic import LqrPolicy, LqrProblem
 
 
 def solve(problem: LqrProblem) -> LqrPolicy:

@@ -12,9 +12,9 @@ an episode is cut short, the value of the pair it was cut at stands for the rest
 
 import numpy as np
 
-from labs.algorithms.compiled import compiled
-from labs.algorithms.experience import Problem, Rule, begin, step_size, transition
 from labs.algorithms.exploration import Behavior, choose
+from labs.compiled import compiled
+from labs.problems.episodes import Problem, Rule, begin, step_size, transition
 
 
 @compiled

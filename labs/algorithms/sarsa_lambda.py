@@ -12,9 +12,9 @@ then the estimates diverge. Replacing traces never exceed 1."""
 
 import numpy as np
 
-from labs.algorithms.compiled import compiled
-from labs.algorithms.experience import Problem, Rule, begin, step_size, transition
 from labs.algorithms.exploration import Behavior, choose
+from labs.compiled import compiled
+from labs.problems.episodes import Problem, Rule, begin, step_size, transition
 
 FAINT = 1e-12
 """A trace below this is over: it is beyond the digits of a float."""

@@ -9,14 +9,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labs.algorithms.compiled import compiled
-from labs.algorithms.experience import Problem, Rule, begin, transition
 from labs.algorithms.exploration import FOLLOW, Behavior
 from labs.algorithms.q_learning import q_learning
-from labs.algorithms.random_numbers import seeded
 from labs.algorithms.sarsa import sarsa, sarsa_n
 from labs.algorithms.sarsa_lambda import sarsa_lambda
+from labs.compiled import compiled
 from labs.errors import LabError
+from labs.problems.episodes import Problem, Rule, begin, transition
+from labs.random_numbers import seeded
 
 Q_LEARNING, SARSA, SARSA_N, SARSA_LAMBDA = range(4)
 METHODS = (q_learning, sarsa, sarsa_n, sarsa_lambda)

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from labs.algorithms.bellman import Sweep, converged, optimal_backup, until_done
-from labs.models.finite_mdp import FiniteMDP
+from labs.problems.finite_mdp import FiniteMDP
 
 
 def init(V: np.ndarray) -> Sweep:

@@ -15,51 +15,20 @@ import numpy as np
 import pinocchio as pin
 
 from labs.errors import LabError
-
-Vector3 = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class Box:
-    """A box centred at its frame; `size` is its full extent along x, y, z [m]."""
-
-    size: Vector3
-
-
-@dataclass(frozen=True)
-class Cylinder:
-    """A cylinder centred at its frame, its axis along z; radius and length [m]."""
-
-    radius: float
-    length: float
-
-
-@dataclass(frozen=True)
-class Sphere:
-    """A ball centred at its frame; radius [m]."""
-
-    radius: float
-
-
-Shape = Box | Cylinder | Sphere
-
-
-@dataclass(frozen=True)
-class Visual:
-    """One rigid piece of what an arm looks like: a mesh file or a primitive, never both."""
-
-    joint: int
-    """The joint it moves with, as an index of the model; 0 is the world."""
-    placement: pin.SE3
-    """Where it sits in that joint's frame."""
-    mesh: str
-    """Path of its mesh; empty for a primitive."""
-    scale: Vector3
-    """Scale of the mesh along x, y, z."""
-    shape: Shape | None
-    """The primitive; None for a mesh."""
-    color: Vector3
-    """Red, green, blue in [0, 1], for whatever brings no material of its own."""
+from labs.shapes import (
+    BLUE,
+    DARK,
+    LIGHT,
+    ORANGE,
+    Box,
+    Cylinder,
+    Shape,
+    Sphere,
+    Vector3,
+    Visual,
+    primitive,
+    translation,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,18 +105,16 @@ def double_pendulum() -> Arm:
     model.name = "double_pendulum"
     hanging = pin.SE3(np.eye(3), np.array([0.0, 0.0, -length / 2]))
     parent, hinge = 0, pin.SE3(np.eye(3), np.array([0.0, 0.0, height]))
-    visuals = [
-        _primitive(0, hinge * _shift(-0.06, 0.0, 0.0), Box((0.06, 0.14, 0.14)), (0.3, 0.32, 0.36))
-    ]
-    for name, color in (("shoulder", (0.16, 0.42, 0.76)), ("elbow", (0.88, 0.5, 0.16))):
+    visuals = [primitive(0, hinge * translation(-0.06, 0.0, 0.0), Box((0.06, 0.14, 0.14)), DARK)]
+    for name, color in (("shoulder", BLUE), ("elbow", ORANGE)):
         parent = model.addJoint(parent, pin.JointModelRX(), hinge, name)
         model.appendBodyToJoint(parent, pin.Inertia.FromCylinder(mass, radius, length), hanging)
         visuals += [
-            _primitive(parent, hanging, Cylinder(radius, length), color),
-            _primitive(parent, pin.SE3.Identity(), Sphere(1.5 * radius), (0.3, 0.32, 0.36)),
+            primitive(parent, hanging, Cylinder(radius, length), color),
+            primitive(parent, pin.SE3.Identity(), Sphere(1.5 * radius), DARK),
         ]
-        hinge = _shift(0.0, 0.0, -length)
-    visuals.append(_primitive(parent, hinge, Sphere(1.2 * radius), color))
+        hinge = translation(0.0, 0.0, -length)
+    visuals.append(primitive(parent, hinge, Sphere(1.2 * radius), color))
     tip = model.addFrame(pin.Frame("tip", parent, hinge, pin.FrameType.OP_FRAME))
     return Arm(
         name="double-pendulum",
@@ -168,42 +135,44 @@ def scara() -> Arm:
     quill that slides along the vertical by 0.15 m either way, and its turn about the vertical.
     All axes are the world's z. At q = 0 the arm is stretched along x. Uniform links; reflected
     inertia of the order of small gear motors."""
-    dark, blue, orange = (0.3, 0.32, 0.36), (0.16, 0.42, 0.76), (0.88, 0.5, 0.16)
-    light = (0.78, 0.8, 0.83)
     model = pin.Model()
     model.name = "scara"
-    shoulder = model.addJoint(0, pin.JointModelRZ(), _shift(0.0, 0.0, 0.5), "shoulder")
-    elbow = model.addJoint(shoulder, pin.JointModelRZ(), _shift(0.4, 0.0, 0.09), "elbow")
-    quill = model.addJoint(elbow, pin.JointModelPZ(), _shift(0.3, 0.0, -0.1), "quill")
-    tool = model.addJoint(quill, pin.JointModelRZ(), _shift(0.0, 0.0, -0.16), "tool")
+    shoulder = model.addJoint(0, pin.JointModelRZ(), translation(0.0, 0.0, 0.5), "shoulder")
+    elbow = model.addJoint(shoulder, pin.JointModelRZ(), translation(0.4, 0.0, 0.09), "elbow")
+    quill = model.addJoint(elbow, pin.JointModelPZ(), translation(0.3, 0.0, -0.1), "quill")
+    tool = model.addJoint(quill, pin.JointModelRZ(), translation(0.0, 0.0, -0.16), "tool")
     for joint in (shoulder, elbow, quill, tool):
         model.addJointFrame(joint)
     links = {shoulder: (5.0, 0.4), elbow: (3.5, 0.3)}
     visuals = [
-        _primitive(0, _shift(0.0, 0.0, 0.01), Box((0.3, 0.3, 0.02)), dark),
-        _primitive(0, _shift(0.0, 0.0, 0.23), Cylinder(0.07, 0.46), light),
+        primitive(0, translation(0.0, 0.0, 0.01), Box((0.3, 0.3, 0.02)), DARK),
+        primitive(0, translation(0.0, 0.0, 0.23), Cylinder(0.07, 0.46), LIGHT),
     ]
-    for (joint, (mass, length)), color in zip(links.items(), (blue, orange), strict=True):
-        middle, size = _shift(length / 2, 0.0, 0.0), (length, 0.11, 0.08)
+    for (joint, (mass, length)), color in zip(links.items(), (BLUE, ORANGE), strict=True):
+        middle, size = translation(length / 2, 0.0, 0.0), (length, 0.11, 0.08)
         model.appendBodyToJoint(joint, pin.Inertia.FromBox(mass, *size), middle)
         visuals += [
-            _primitive(joint, middle, Box(size), color),
-            _primitive(joint, pin.SE3.Identity(), Cylinder(0.075, 0.085), dark),
+            primitive(joint, middle, Box(size), color),
+            primitive(joint, pin.SE3.Identity(), Cylinder(0.075, 0.085), DARK),
         ]
-    model.appendBodyToJoint(quill, pin.Inertia.FromCylinder(1.0, 0.018, 0.45), _shift(0, 0, 0.06))
-    model.appendBodyToJoint(tool, pin.Inertia.FromBox(0.5, 0.1, 0.04, 0.03), _shift(0, 0, -0.03))
+    model.appendBodyToJoint(
+        quill, pin.Inertia.FromCylinder(1.0, 0.018, 0.45), translation(0, 0, 0.06)
+    )
+    model.appendBodyToJoint(
+        tool, pin.Inertia.FromBox(0.5, 0.1, 0.04, 0.03), translation(0, 0, -0.03)
+    )
     visuals += [
-        _primitive(elbow, _shift(0.3, 0.0, 0.0), Cylinder(0.06, 0.14), dark),
-        _primitive(quill, _shift(0.0, 0.0, 0.07), Cylinder(0.018, 0.46), light),
-        _primitive(tool, _shift(0.0, 0.0, -0.015), Cylinder(0.03, 0.03), dark),
-        _primitive(tool, _shift(0.0, 0.0, -0.04), Box((0.1, 0.03, 0.02)), blue),
+        primitive(elbow, translation(0.3, 0.0, 0.0), Cylinder(0.06, 0.14), DARK),
+        primitive(quill, translation(0.0, 0.0, 0.07), Cylinder(0.018, 0.46), LIGHT),
+        primitive(tool, translation(0.0, 0.0, -0.015), Cylinder(0.03, 0.03), DARK),
+        primitive(tool, translation(0.0, 0.0, -0.04), Box((0.1, 0.03, 0.02)), BLUE),
     ]
     model.armature = np.array([0.3, 0.15, 5.0, 0.01])
     model.lowerPositionLimit = np.array([-np.pi, -2.6, -0.15, -np.pi])
     model.upperPositionLimit = -model.lowerPositionLimit
     limit = np.array([100.0, 60.0, 150.0, 10.0])
     model.effortLimit = limit.copy()
-    tip = model.addFrame(pin.Frame("tip", tool, _shift(0, 0, -0.05), pin.FrameType.OP_FRAME))
+    tip = model.addFrame(pin.Frame("tip", tool, translation(0, 0, -0.05), pin.FrameType.OP_FRAME))
     return Arm(
         name="scara",
         title="SCARA",
@@ -276,11 +245,3 @@ def _shape(geometry: Any) -> Shape | None:
 
 def _three(values: Any) -> Vector3:
     return float(values[0]), float(values[1]), float(values[2])
-
-
-def _primitive(joint: int, placement: pin.SE3, shape: Shape, color: Vector3) -> Visual:
-    return Visual(joint, placement, "", (1.0, 1.0, 1.0), shape, color)
-
-
-def _shift(x: float, y: float, z: float) -> pin.SE3:
-    return pin.SE3(np.eye(3), np.array([x, y, z]))

@@ -14,16 +14,13 @@ from functools import cache
 import numpy as np
 import pinocchio as pin
 
-from labs.models.arms import Arm, Box, Cylinder, Shape, Sphere, Vector3, Visual
+from labs.models.arms import Arm
+from labs.shapes import BLUE, DARK, LIGHT, ORANGE, Box, Cylinder, Sphere, primitive, translation
 
 CART, POLE, LENGTH, RADIUS = 1.0, 0.3, 0.6, 0.015
 """Masses of cart and rod [kg], length and radius of the rod [m]."""
 HEIGHT, REACH = 0.75, 1.5
 """Of the hinge over the floor; half the rail's length [m]. The rail has no end stops."""
-DARK: Vector3 = (0.3, 0.32, 0.36)
-LIGHT: Vector3 = (0.78, 0.8, 0.83)
-BLUE: Vector3 = (0.16, 0.42, 0.76)
-ORANGE: Vector3 = (0.88, 0.5, 0.16)
 
 
 @cache
@@ -31,25 +28,25 @@ def cart_pole() -> Arm:
     """The cart with its pole, its tip the pole's free end."""
     model = pin.Model()
     model.name = "cart_pole"
-    cart = model.addJoint(0, pin.JointModelPY(), _shift(0.0, 0.0, HEIGHT), "cart")
+    cart = model.addJoint(0, pin.JointModelPY(), translation(0.0, 0.0, HEIGHT), "cart")
     hinge = model.addJoint(cart, pin.JointModelRX(), pin.SE3.Identity(), "hinge")
-    middle, end = _shift(0.0, 0.0, -LENGTH / 2), _shift(0.0, 0.0, -LENGTH)
-    box, below = (0.16, 0.24, 0.1), _shift(-0.1, 0.0, 0.0)
+    middle, end = translation(0.0, 0.0, -LENGTH / 2), translation(0.0, 0.0, -LENGTH)
+    box, below = (0.16, 0.24, 0.1), translation(-0.1, 0.0, 0.0)
     model.appendBodyToJoint(cart, pin.Inertia.FromBox(CART, *box), below)
     model.appendBodyToJoint(hinge, pin.Inertia.FromCylinder(POLE, RADIUS, LENGTH), middle)
     tip = model.addFrame(pin.Frame("tip", hinge, end, pin.FrameType.OP_FRAME))
     along = pin.SE3(pin.rpy.rpyToMatrix(-np.pi / 2, 0.0, 0.0), np.array([-0.1, 0.0, HEIGHT]))
     axle = pin.SE3(pin.rpy.rpyToMatrix(0.0, np.pi / 2, 0.0), np.array([-0.02, 0.0, 0.0]))
     visuals = (
-        _piece(0, along, Cylinder(0.018, 2 * REACH), LIGHT),
+        primitive(0, along, Cylinder(0.018, 2 * REACH), LIGHT),
         *(
-            _piece(0, _shift(-0.1, y, HEIGHT / 2), Box((0.05, 0.05, HEIGHT)), DARK)
+            primitive(0, translation(-0.1, y, HEIGHT / 2), Box((0.05, 0.05, HEIGHT)), DARK)
             for y in (-REACH, REACH)
         ),
-        _piece(cart, below, Box(box), BLUE),
-        _piece(cart, axle, Cylinder(0.02, 0.1), DARK),
-        _piece(hinge, middle, Cylinder(RADIUS, LENGTH), ORANGE),
-        _piece(hinge, end, Sphere(2.2 * RADIUS), ORANGE),
+        primitive(cart, below, Box(box), BLUE),
+        primitive(cart, axle, Cylinder(0.02, 0.1), DARK),
+        primitive(hinge, middle, Cylinder(RADIUS, LENGTH), ORANGE),
+        primitive(hinge, end, Sphere(2.2 * RADIUS), ORANGE),
     )
     return Arm(
         name="cart-pole",
@@ -62,11 +59,3 @@ def cart_pole() -> Arm:
         collisions=visuals,
         camera=((3.4, 0.7, 1.4), (0.0, 0.0, 0.75)),
     )
-
-
-def _piece(joint: int, placement: pin.SE3, shape: Shape, color: Vector3) -> Visual:
-    return Visual(joint, placement, "", (1.0, 1.0, 1.0), shape, color)
-
-
-def _shift(x: float, y: float, z: float) -> pin.SE3:
-    return pin.SE3(np.eye(3), np.array([x, y, z]))

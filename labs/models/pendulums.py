@@ -15,7 +15,8 @@ import numpy as np
 import pinocchio as pin
 
 from labs.algorithms.runge_kutta import Flow
-from labs.models.arms import Arm, Box, Cylinder, Shape, Sphere, Vector3, Visual
+from labs.models.arms import Arm
+from labs.shapes import Box, Cylinder, Sphere, Vector3, primitive, translation
 
 LENGTH, RADIUS, MASS = 0.5, 0.02, 2.0
 """Of a rod [m], [m], [kg]."""
@@ -89,15 +90,15 @@ def hanging(rods: int, place: tuple[float, float] = (0.0, 0.0), color: Vector3 =
     """The same as a robot to draw, hung up at (*place, 0.25 + rods L) [m]."""
     model = pin.Model()
     model.name = f"pendulum{rods}"
-    middle = _shift(0.0, 0.0, -LENGTH / 2)
-    parent, hinge = 0, _shift(*place, 0.25 + rods * LENGTH)
-    visuals = [_piece(0, hinge, Box((0.05, 0.07, 0.05)), GRAY)]
+    middle = translation(0.0, 0.0, -LENGTH / 2)
+    parent, hinge = 0, translation(*place, 0.25 + rods * LENGTH)
+    visuals = [primitive(0, hinge, Box((0.05, 0.07, 0.05)), GRAY)]
     for rod in range(rods):
         parent = model.addJoint(parent, pin.JointModelRX(), hinge, f"hinge{rod + 1}")
         model.appendBodyToJoint(parent, pin.Inertia.FromCylinder(MASS, RADIUS, LENGTH), middle)
-        visuals.append(_piece(parent, middle, Cylinder(RADIUS, LENGTH), color))
-        hinge = _shift(0.0, 0.0, -LENGTH)
-        visuals.append(_piece(parent, hinge, Sphere(2.2 * RADIUS), color))
+        visuals.append(primitive(parent, middle, Cylinder(RADIUS, LENGTH), color))
+        hinge = translation(0.0, 0.0, -LENGTH)
+        visuals.append(primitive(parent, hinge, Sphere(2.2 * RADIUS), color))
     tip = model.addFrame(pin.Frame("tip", parent, hinge, pin.FrameType.OP_FRAME))
     return Arm(
         name=model.name,
@@ -110,11 +111,3 @@ def hanging(rods: int, place: tuple[float, float] = (0.0, 0.0), color: Vector3 =
         collisions=tuple(visuals),
         camera=((2.6, 1.6, 1.2), (0.0, 0.0, 0.6)),
     )
-
-
-def _piece(joint: int, placement: pin.SE3, shape: Shape, color: Vector3) -> Visual:
-    return Visual(joint, placement, "", (1.0, 1.0, 1.0), shape, color)
-
-
-def _shift(x: float, y: float, z: float) -> pin.SE3:
-    return pin.SE3(np.eye(3), np.array([x, y, z]))

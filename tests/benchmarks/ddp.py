@@ -13,10 +13,10 @@ import pinocchio as pin
 
 from labs.algorithms import ddp
 from labs.algorithms.ddp import Iterate, Options
-from labs.algorithms.optimal_control import Problem
 from labs.models.discrete import Discrete
 from labs.models.mechanisms import Mechanism, mechanism
-from labs.models.motion_cost import MotionCost, Reach
+from labs.problems.optimal_control import Problem
+from labs.tasks.motion.cost import MotionCost, Reach
 
 PHASES = ("derivatives", "backward", "forward")
 ROUNDS = 60

@@ -6,8 +6,8 @@ import time
 import numpy as np
 
 from labs.algorithms import value_iteration
-from labs.models.finite_mdp import FiniteMDP
-from labs.models.pendulum_mdp import PendulumGrid
+from labs.problems.finite_mdp import FiniteMDP
+from labs.tasks.pendulum_table.table import PendulumGrid
 
 GAMMA, LEVELS, TOLERANCE = 0.98, 11, 1e-6
 SIDES = (11, 21, 51, 101, 201, 501, 1001)

@@ -6,8 +6,8 @@ import time
 import numpy as np
 import pinocchio as pin
 
+from labs.engine.headless import run
 from labs.models.arms import ur5
-from labs.run import run
 
 SECONDS = 1.0
 ROUNDS = 41

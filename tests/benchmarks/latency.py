@@ -10,7 +10,7 @@ from typing import Any
 
 from websockets.exceptions import ConnectionClosed
 
-from labs.catalog import find
+from labs.engine.catalog import find
 from tests.served import Opened, Served
 from tests.viser_client import SceneClient
 

@@ -5,10 +5,10 @@ from time import perf_counter
 
 import numpy as np
 
-from labs.algorithms.linear_quadratic import LqrProblem
 from labs.algorithms.riccati import prepare, solve
-from labs.models.linear_systems import linear_system
-from labs.models.lqr_study import HORIZONS, compare
+from labs.optimal_control.lqr.comparison import HORIZONS, compare
+from labs.problems.linear_quadratic import LqrProblem
+from labs.tasks.regulation.linear_systems import linear_system
 
 ROUNDS = 101
 

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labs.catalog import find
-from labs.optimal_control.ddp import DdpState
+from labs.engine.catalog import find
+from labs.engine.run import World
+from labs.optimal_control.ddp.lab import DdpState
 from labs.params import Value
-from labs.run import World
 from tests.served import Served
 from tests.viser_client import SceneClient
 

@@ -6,13 +6,13 @@ import time
 
 import numpy as np
 
-from labs.algorithms.experience import Problem, Rule
 from labs.algorithms.exploration import EPSILON_GREEDY, Behavior
 from labs.algorithms.td_control import Q_LEARNING, SARSA, SARSA_LAMBDA, SARSA_N, init, step
-from labs.catalog import find
-from labs.models.grid_worlds import MAPS
-from labs.models.learning_tasks import Task, grid_task, pendulum_task
-from labs.run import World
+from labs.engine.catalog import find
+from labs.engine.run import World
+from labs.problems.episodes import Problem, Rule
+from labs.reinforcement_learning.td_control.tasks import Task, grid_task, pendulum_task
+from labs.tasks.grid_world.map import MAPS
 
 ROUNDS = 7
 FRAME = 1 / 30

@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import Page, expect
 
-from labs.catalog import catalog
+from labs.engine.catalog import catalog
 from server.articles import render
 from tests.browser.conftest import screenshot
 from tests.browser.lab_page import LabPage

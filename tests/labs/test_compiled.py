@@ -5,14 +5,14 @@ import subprocess
 import sys
 from pathlib import Path
 
-from labs.algorithms.compiled import forget_stale
+from labs.compiled import forget_stale
 
 AFTERWARDS = """
 import json, sys
 from numba.core.dispatcher import Dispatcher
-from labs.catalog import catalog
+from labs.engine.catalog import catalog
 from labs.params import Choice, Toggle
-from labs.run import World
+from labs.engine.run import World
 
 def versions():
     loaded = [m for name, m in list(sys.modules.items()) if name.startswith("labs")]

@@ -12,15 +12,17 @@ import pytest
 from numpy.typing import ArrayLike
 
 from labs import plots
-from labs.catalog import Entry, catalog
+from labs.engine.catalog import Entry, catalog
+from labs.engine.events import Event
+from labs.engine.headless import run
+from labs.engine.run import World
+from labs.engine.snapshots import leaves
+from labs.engine.solution import Solution
 from labs.lab import Inputs, Snapshot, State
-from labs.models.arms import Arm
 from labs.params import Choice, Knob, Params, Text, Toggle, Value
 from labs.plots import Bars, Curve, Curves, HeatMap, Matrix, Note, Readout, TimeSeries
-from labs.run import Event, World, run
 from labs.scene import Color
-from labs.snapshots import leaves
-from labs.solution import Solution
+from labs.shapes import Body
 from server.articles import render, tex
 
 SECONDS = 1.0
@@ -83,7 +85,7 @@ class CheckingScene:
     def arm(
         self,
         name: str,
-        arm: Arm,
+        arm: Body,
         q: np.ndarray,
         *,
         ghost: bool = False,

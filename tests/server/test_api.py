@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labs.run import Event, run
+from labs.engine.events import Event
+from labs.engine.headless import run
 from tests.served import Served, until
 
 

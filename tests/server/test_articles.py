@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from labs.catalog import Entry, catalog
+from labs.engine.catalog import Entry, catalog
 from server.articles import Article, ArticleError, render, render_text, tex, words
 
 COURSE = [entry for entry in catalog().values() if entry.package.startswith("labs.")]

@@ -9,7 +9,7 @@ import pytest
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
-from labs.catalog import catalog
+from labs.engine.catalog import catalog
 from server.articles import render
 from server.pages import STATIC, VENDOR, install, lab_data, vendor_url
 

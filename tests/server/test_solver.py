@@ -11,9 +11,11 @@ import httpx
 import numpy as np
 import pytest
 
-from labs.catalog import find
-from labs.run import World, events_of, run
-from labs.solution import Solution
+from labs.engine.catalog import find
+from labs.engine.events import events_of
+from labs.engine.headless import run
+from labs.engine.run import World
+from labs.engine.solution import Solution
 from server.cli import main
 from server.messages import SolverStatus
 from server.solver_clock import SolverClock

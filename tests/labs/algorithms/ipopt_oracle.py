@@ -9,10 +9,10 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
-from labs.algorithms.optimal_control import Problem
 from labs.models.discrete import Discrete
 from labs.models.mechanisms import Mechanism
-from labs.models.motion_cost import MotionCost
+from labs.problems.optimal_control import Problem
+from labs.tasks.motion.cost import MotionCost
 
 STAGES = {"explicit-euler": 1, "semi-implicit-euler": 1, "rk4": 4}
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import hypothesis.strategies as st
 import numpy as np
 
-from labs.models.finite_mdp import FiniteMDP
+from labs.problems.finite_mdp import FiniteMDP
 
 
 def random_mdp(

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 
 from labs.algorithms.bellman import error_bound, optimal_backup, policy_backup, q_values
 from labs.algorithms.policy_iteration import optimum
-from labs.models.finite_mdp import FiniteMDP, random_policy
+from labs.problems.finite_mdp import FiniteMDP, random_policy
 from tests.labs.algorithms.random_mdps import mdps
 
 seeds = st.integers(0, 2**32 - 1)

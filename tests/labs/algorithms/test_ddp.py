@@ -9,11 +9,11 @@ import pytest
 from labs.algorithms import ddp
 from labs.algorithms.ddp import Options
 from labs.algorithms.ddp_sweep import backward_pass
-from labs.algorithms.optimal_control import Problem, expand, rollout, whole
 from labs.errors import LabError
 from labs.models.discrete import Discrete
 from labs.models.mechanisms import mechanism
-from labs.models.motion_cost import MotionCost, Reach
+from labs.problems.optimal_control import Problem, expand, rollout, whole
+from labs.tasks.motion.cost import MotionCost, Reach
 from tests.labs.algorithms.ipopt_oracle import inverse_dynamics, optimum, tip_position
 
 UPRIGHT = {"pendulum": [np.pi, 0.0], "cart-pole": [0.0, np.pi, 0.0, 0.0]}

@@ -19,9 +19,9 @@ from labs.algorithms import (
 from labs.algorithms.bellman import optimal_backup, q_values
 from labs.algorithms.policy_iteration import optimum
 from labs.errors import LabError
-from labs.models.finite_mdp import FiniteMDP, random_policy
-from labs.models.grid_worlds import MAPS, GridWorld
-from labs.models.pendulum_mdp import pendulum_grid
+from labs.problems.finite_mdp import FiniteMDP, random_policy
+from labs.tasks.grid_world.map import MAPS, GridWorld
+from labs.tasks.pendulum_table.table import pendulum_grid
 from tests.labs.algorithms.random_mdps import mdps, random_mdp
 
 seeds = st.integers(0, 2**32 - 1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from labs.algorithms.exploration import BOLTZMANN, CONFIDENCE, FOLLOW, Behavior, choose, greedy
-from labs.algorithms.random_numbers import seeded
+from labs.random_numbers import seeded
 
 DRAWS = 20_000
 COSTS = np.array([3.0, 1.0, 2.0, 1.5])

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from labs.algorithms.linear_quadratic import LqrProblem
 from labs.algorithms.periodic_lqr import Periodic, periodic, preview
 from labs.algorithms.riccati import solve
 from labs.errors import LabError
+from labs.problems.linear_quadratic import LqrProblem
 
 M = 12
 

@@ -11,10 +11,10 @@ from qpsolvers import Problem, solve_problem
 from scipy.linalg import block_diag, solve_discrete_are
 
 from labs.algorithms.least_squares_lqr import solve_at_once, trajectory_map
-from labs.algorithms.linear_quadratic import LqrPolicy, LqrProblem, tracking
 from labs.algorithms.riccati import solve, steady_state, steady_state_directly
 from labs.algorithms.stabilizability import hidden_modes
 from labs.errors import LabError
+from labs.problems.linear_quadratic import LqrPolicy, LqrProblem, tracking
 
 ONE = np.eye(1)
 

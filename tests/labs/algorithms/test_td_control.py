@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labs.algorithms.experience import Problem, Rule, problem
 from labs.algorithms.exploration import CONFIDENCE, FOLLOW, Behavior, choose
 from labs.algorithms.td_control import (
     Q_LEARNING,
@@ -18,8 +17,9 @@ from labs.algorithms.td_control import (
     step,
 )
 from labs.errors import LabError
-from labs.models.finite_mdp import FiniteMDP
-from labs.models.grid_worlds import MAPS, GridWorld
+from labs.problems.episodes import Problem, Rule, problem
+from labs.problems.finite_mdp import FiniteMDP
+from labs.tasks.grid_world.map import MAPS, GridWorld
 
 METHODS = [Q_LEARNING, SARSA, SARSA_N, SARSA_LAMBDA]
 every_method = pytest.mark.parametrize("method", METHODS)

@@ -1,0 +1,282 @@
+"""A solver's solution as a file, to be taken up again another day.
+
+It holds the lab, its parameters and seed, the iteration, and what the snapshot holds, flat: every
+array under the names that lead to it, joined by dots ("policy.K", "knots.0"). A JSON file has them
+under "data", each with dtype, shape and values; an NPZ file has an array each, and all else as
+JSON in the array "about". Durations ("seconds" in a snapshot) are left out: they belong to one
+run on one machine.
+"""
+
+import io
+import json
+import math
+import zipfile
+import zlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass, replace
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from labs.engine.record import versions
+from labs.engine.snapshots import leaves
+from labs.errors import LabError
+from labs.lab import Snapshot
+from labs.params import Value
+
+FORMS = ("json", "npz")
+MAX_UNPACKED = 256 * 2**20
+"""[bytes] A file that unpacks to more is not read."""
+MAX_ARRAYS = 2000
+KINDS = {"b": "truth values", "i": "whole numbers", "f": "numbers", "c": "complex numbers"}
+KINDS |= {"u": KINDS["i"], "U": "text"}
+
+
+class _About(BaseModel):
+    """What a file says beside its arrays."""
+
+    model_config = ConfigDict(strict=True, allow_inf_nan=False)
+
+    lab: Annotated[str, Field(max_length=64)]
+    params: dict[str, float | bool | str]
+    seed: Annotated[int, Field(ge=0, lt=2**32)]
+    iteration: Annotated[int, Field(ge=0, le=2**53)]
+    done: Annotated[str, Field(max_length=1000)]
+    progress: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a solver had found, of which problem."""
+
+    lab: str
+    params: Mapping[str, Value]
+    seed: int
+    iteration: int
+    done: str
+    """Why the solver had stopped; empty where it had not."""
+    progress: float | None
+    arrays: Mapping[str, np.ndarray]
+    """By their flat names."""
+
+    @classmethod
+    def of(cls, lab: str, params: Mapping[str, Value], seed: int, snapshot: Snapshot) -> "Solution":
+        """What a snapshot holds."""
+        about = (snapshot.iteration, snapshot.done, snapshot.progress)
+        return cls(lab, params, seed, *about, dict(leaves(_lasting(snapshot.data))))
+
+    def about(self) -> dict[str, Any]:
+        """All but the arrays."""
+        return {
+            "lab": self.lab,
+            "params": dict(self.params),
+            "seed": self.seed,
+            "iteration": self.iteration,
+            "done": self.done,
+            "progress": self.progress,
+            "versions": versions(),
+        }
+
+    # Writing ----------------------------------------------------------------------------------
+
+    def plain(self) -> dict[str, Any]:
+        """What the JSON file holds."""
+        return self.about() | {"data": {name: _spelled(a) for name, a in self.arrays.items()}}
+
+    def json(self) -> bytes:
+        import orjson  # on demand: a headless run without output needs no writer
+
+        return orjson.dumps(self.plain())
+
+    def npz(self) -> bytes:
+        data = io.BytesIO()
+        about = np.array(json.dumps(self.about()))
+        np.savez_compressed(data, about=about, **self.arrays)  # type: ignore[arg-type]
+        return data.getvalue()
+
+    def write(self, form: str) -> bytes:
+        """`form` is "json" or "npz"."""
+        return {"json": self.json, "npz": self.npz}[form]()
+
+    # Reading ----------------------------------------------------------------------------------
+
+    @classmethod
+    def read(cls, data: bytes) -> "Solution":
+        """What a file holds, JSON or NPZ. Raises LabError."""
+        try:
+            if data.startswith(b"PK"):
+                arrays = _unpacked(data)
+                about = json.loads(str(arrays.pop("about")))
+                return cls._checked(about, arrays)
+            import orjson  # on demand, as for writing
+
+            return cls.from_plain(orjson.loads(data))
+        except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError) as error:
+            raise LabError(f"this is no solution saved by orclab ({_short(error)})") from None
+        except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError) as error:
+            raise LabError(f"this NPZ file cannot be read ({_short(error)})") from None
+
+    @classmethod
+    def from_plain(cls, found: Mapping[str, Any]) -> "Solution":
+        """What `plain` gave. Raises LabError, ValueError, KeyError or TypeError."""
+        arrays = {str(name): _read(name, spelled) for name, spelled in found["data"].items()}
+        return cls._checked(found, arrays)
+
+    @classmethod
+    def _checked(cls, about: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> "Solution":
+        try:
+            checked = _About.model_validate(
+                {k: about[k] for k in _About.model_fields if k in about}
+            )
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(str(part) for part in first["loc"])
+            raise LabError(
+                f"this is no solution saved by orclab ({where}: {first['msg']})"
+            ) from None
+        return cls(**dict(checked), arrays=arrays)
+
+    # Taking up --------------------------------------------------------------------------------
+
+    def check_lab(self, slug: str) -> None:
+        """Raises LabError unless it is a solution of this lab."""
+        if self.lab != slug:
+            raise LabError(
+                f"this is a solution of {self.lab!r}, and here is {slug!r}: load it there"
+            )
+
+    def fitted(self, own: Sequence[Snapshot]) -> Mapping[str, Any]:
+        """The data of a snapshot, put together as the lab's `own` first ones are.
+
+        Names, kinds and ranks have to be those of `own`, and shapes too, but along axes that
+        differ among `own`: those grow from iteration to iteration. Raises LabError."""
+        shapes = [{name: a.shape for name, a in leaves(_lasting(one.data))} for one in own]
+        wanted = dict(leaves(_lasting(own[0].data)))
+        if missing := sorted(wanted.keys() - self.arrays.keys()):
+            raise LabError(f"the solution lacks {_listed(missing)}: it is of another version")
+        if unknown := sorted(self.arrays.keys() - wanted.keys()):
+            raise LabError(f"the solution has {_listed(unknown)}, of which this lab knows nothing")
+        fitted = {
+            name: _like(name, self.arrays[name], model, [s[name] for s in shapes if name in s])
+            for name, model in wanted.items()
+        }
+        data = _rebuilt(_lasting(own[0].data), "", fitted)
+        assert isinstance(data, dict)
+        # A solver's durations begin anew.
+        return data | ({"seconds": {}} if "seconds" in own[0].data else {})
+
+    def snapshot(self, own: Sequence[Snapshot]) -> Snapshot:
+        """As `Lab.accept` takes it. Raises LabError."""
+        return Snapshot(self.iteration, self.fitted(own), self.done, self.progress)
+
+
+def _lasting(data: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in data.items() if name != "seconds"}
+
+
+def _like(
+    name: str, array: np.ndarray, model: np.ndarray, shapes: Sequence[tuple[int, ...]]
+) -> np.ndarray:
+    """The array with the type and layout of the lab's own."""
+    if KINDS.get(array.dtype.kind) != KINDS.get(model.dtype.kind):
+        kinds = [KINDS.get(a.dtype.kind, "something else") for a in (array, model)]
+        raise LabError(f"{name} of the solution holds {kinds[0]}; it takes {kinds[1]}")
+    if array.ndim != model.ndim or not all(
+        size == own or any(other[axis] != own for other in shapes if len(other) == model.ndim)
+        for axis, (size, own) in enumerate(zip(array.shape, model.shape, strict=True))
+    ):
+        raise LabError(
+            f"{name} of the solution has the shape {array.shape}; with its parameters "
+            f"it takes {model.shape}"
+        )
+    if model.dtype.kind == "U":
+        return array
+    columns = model.flags.f_contiguous and not model.flags.c_contiguous
+    with np.errstate(all="ignore"):
+        cast: np.ndarray = np.array(array, dtype=model.dtype, order="F" if columns else "C")
+    if model.dtype.kind in "fc" and not np.isfinite(cast).all():
+        raise LabError(f"{name} of the solution holds numbers that are not finite")
+    if model.dtype.kind in "iu" and not np.array_equal(cast, array):
+        raise LabError(f"{name} of the solution holds numbers too large for this lab")
+    return cast
+
+
+def _rebuilt(model: Any, path: str, arrays: Mapping[str, np.ndarray]) -> Any:
+    """Plain data in the form of `model` with these values in it."""
+
+    def part(name: object, value: Any) -> Any:
+        return _rebuilt(value, f"{path}.{name}" if path else str(name), arrays)
+
+    if model is None:
+        return None
+    if isinstance(model, Mapping):
+        return {name: part(name, value) for name, value in model.items()}
+    if is_dataclass(model) and not isinstance(model, type):
+        return replace(
+            model, **{f.name: part(f.name, getattr(model, f.name)) for f in fields(model)}
+        )
+    if isinstance(model, list | tuple):
+        return type(model)(part(place, value) for place, value in enumerate(model))
+    if isinstance(model, np.ndarray):
+        return arrays[path]
+    return type(model)(arrays[path].item())
+
+
+def _spelled(array: np.ndarray) -> dict[str, Any]:
+    """An array in JSON, bit for bit; of a complex number, its two parts."""
+    if array.dtype.kind == "U":
+        return {"dtype": "str", "shape": array.shape, "values": array.ravel().tolist()}
+    flat = np.ascontiguousarray(array).ravel()
+    parts = flat.view(flat.real.dtype) if array.dtype.kind == "c" else flat
+    return {"dtype": array.dtype.name, "shape": array.shape, "values": parts.tolist()}
+
+
+def _read(name: str, spelled: Mapping[str, Any]) -> np.ndarray:
+    shape, values, dtype = tuple(spelled["shape"]), spelled["values"], spelled["dtype"]
+    flat: Iterable[Any] = values
+    if dtype == "str":
+        array = np.array([str(value) for value in flat])
+    else:
+        kind = np.dtype(dtype)
+        if kind.kind not in "biufc":
+            raise LabError(f"{name} of the solution holds neither numbers nor text")
+        # What is not a number in JSON was not finite.
+        numbers = [math.nan if value is None else value for value in flat]
+        parts = np.dtype(f"f{kind.itemsize // 2}") if kind.kind == "c" else kind
+        array = np.array(numbers, parts).view(kind)
+    if math.prod(shape) != array.size:
+        raise ValueError(f"{name} has {array.size} values for the shape {shape}")
+    return array.reshape(shape)
+
+
+def _unpacked(data: bytes) -> dict[str, np.ndarray]:
+    """The arrays of an NPZ file, none of which may be larger than it says or hold objects."""
+    with zipfile.ZipFile(io.BytesIO(data)) as packed:
+        members = packed.infolist()
+        if len(members) > MAX_ARRAYS or sum(m.file_size for m in members) > MAX_UNPACKED:
+            raise LabError(
+                f"this NPZ file unpacks to more than {MAX_UNPACKED // 2**20} MiB or "
+                f"{MAX_ARRAYS} arrays: it is not read"
+            )
+        return {m.filename.removesuffix(".npy"): _array(packed.read(m)) for m in members}
+
+
+def _array(content: bytes) -> np.ndarray:
+    stream = io.BytesIO(content)
+    major, _ = np.lib.format.read_magic(stream)
+    read_header = {1: "read_array_header_1_0", 2: "read_array_header_2_0"}[major]
+    shape, _, dtype = getattr(np.lib.format, read_header)(stream)
+    # Before anything of that size is made.
+    if dtype.hasobject or math.prod(shape) * dtype.itemsize != len(content) - stream.tell():
+        raise ValueError("an array in it is not what it says")
+    array: np.ndarray = np.load(io.BytesIO(content), allow_pickle=False)
+    return array
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names[:5]) + (" and more" if len(names) > 5 else "")
+
+
+def _short(error: Exception) -> str:
+    return f"{type(error).__name__}: {error}"[:200]

@@ -1,0 +1,49 @@
+"""Riccati against least squares over growing horizons: the same controls, O(N) and O(N^3)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from time import thread_time
+
+import numpy as np
+
+from labs.algorithms.least_squares_lqr import solve_at_once
+from labs.algorithms.riccati import solve
+from labs.problems.linear_quadratic import LqrProblem
+
+COUNT = 7
+"""Horizons tried."""
+_FEW, _MANY = (4, 6, 9, 14, 22, 34, 50), (10, 20, 40, 80, 130, 190, 260)
+HORIZONS: Mapping[str, tuple[int, ...]] = {
+    "cart-pole": _MANY,
+    "pendulum": _MANY,
+    "mass": _MANY,
+    "ur5": _FEW,
+}
+"""N of each system, as far as least squares takes a few hundredths of a second."""
+FIRST = 0.1
+"""[m, rad, m/s, rad/s] every component of the x_0 they start from."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Both solutions of one problem."""
+
+    difference: float
+    """Largest difference between their controls, as a share of the largest control."""
+    riccati: float
+    """Processor time [s], from the given matrices to all controls from x_0."""
+    least_squares: float
+    """The same [s]."""
+
+
+def compare(problem: LqrProblem) -> Comparison:
+    """Solves the problem both ways."""
+    x0 = np.full(problem.n, FIRST)
+    begin = thread_time()
+    _, by_riccati = problem.follow(solve(problem), x0)
+    middle = thread_time()
+    at_once = solve_at_once(problem, x0)
+    end = thread_time()
+    largest = float(np.abs(at_once).max()) or 1.0
+    difference = float(np.abs(by_riccati - at_once).max()) / largest
+    return Comparison(difference, middle - begin, end - middle)

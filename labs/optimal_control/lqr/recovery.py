@@ -1,0 +1,223 @@
+"""From where a linear policy brings a nonlinear system back: rollouts of the closed loop.
+
+    x' = f(x, u),    u = clip(K_t (x - x_eq), limit), held for T,    K_t given for t = 0, 1, ...,
+                                                                     M - 1 and then over again
+
+for the cart-pole, the pendulum and the mass on a line, whose rest needs no control (u_eq = 0).
+One turn of M periods maps dx, where it is small, to Phi dx. If Phi is stable, L = Phi' L Phi + I
+has a solution, and dx' L dx decreases from turn to turn. A rollout has recovered once it is in the
+largest ellipsoid dx' L dx <= c in which nothing leans by more than CLOSE, no limit is met and
+no rail ends all through a turn; it is lost at the rail's end, beyond two turns round, or if it
+takes longer than PATIENCE. Integrated by RK4 as in `linear_systems.py`, in closed form.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from scipy.linalg import solve_discrete_lyapunov
+
+from labs.compiled import compiled
+from labs.models import cart_pole, mass_on_a_line, pendulums
+from labs.tasks.regulation.linear_systems import STEP, linear_system
+
+CLOSE = 0.1
+"""[rad] near enough to the rest for the linear map to hold."""
+PATIENCE = 20.0
+"""[s]"""
+POINTS = 41
+"""Along either axis of the plane."""
+GRAVITY = 9.81
+
+SPAN: Mapping[str, tuple[float, float]] = {
+    "cart-pole": (1.2, 8.0),
+    "pendulum": (pi, 12.0),
+    "mass": (1.5, 5.0),
+}
+"""The plane's half widths: of the coordinate [rad; m] and of its rate."""
+CODES: Mapping[str, int] = {"mass": 0, "pendulum": 1, "cart-pole": 2}
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedLoop:
+    """A system under a linear policy."""
+
+    system: str
+    """One of CODES."""
+    period: float
+    """T [s]."""
+    gains: np.ndarray
+    """K (M, nx), one control."""
+    limit: float
+    """[N; N m], may be infinite."""
+
+    def turn(self) -> np.ndarray:
+        """Phi (M + 1, nx, nx): dx after t periods is Phi_t dx, where dx is small."""
+        a, b = linear_system(self.system).linear(self.period)
+        phi = [np.eye(len(a))]
+        for gain in self.gains:
+            phi.append((a + b @ gain[None]) @ phi[-1])
+        return np.array(phi)
+
+    def haven(self) -> tuple[np.ndarray, float]:
+        """L and c of the ellipsoid around the rest; c = -1 where the loop is unstable there."""
+        system, phi = linear_system(self.system), self.turn()
+        n = system.nx
+        with np.errstate(all="ignore"):
+            radius = np.abs(np.linalg.eigvals(phi[-1])).max() if np.isfinite(phi).all() else np.inf
+        if not radius < 1.0 - 1e-9:
+            return np.eye(n), -1.0
+        shape = solve_discrete_lyapunov(phi[-1].T, np.eye(n))
+        controls = np.einsum("ti,tij->tj", self.gains, phi[:-1])
+        bounded = [(controls, self.limit)]
+        for i in range(system.mechanism.nq):
+            bounded.append((phi[:, i], system.reach if i in system.sliding else CLOSE))
+        inverse = np.linalg.inv(shape)
+        level = np.inf
+        for rows, bound in bounded:
+            spread = np.einsum("ti,ij,tj->t", rows, inverse, rows).max()
+            level = min(level, bound**2 / spread if spread > 0.0 else np.inf)
+        return shape, level
+
+    def recovers(self, deviations: np.ndarray) -> np.ndarray:
+        """Which of the deviations dx (k, nx) from the rest are brought back, (k,) bool."""
+        system = linear_system(self.system)
+        shape, level = self.haven()
+        starts = np.ascontiguousarray(deviations, float)
+        back = np.zeros(len(starts), np.bool_)
+        if level > 0.0:
+            _judge(
+                CODES[self.system],
+                starts,
+                system.x_eq,
+                np.ascontiguousarray(self.gains),
+                self.limit,
+                shape,
+                level,
+                system.reach,
+                round(self.period / STEP),
+                round(PATIENCE / self.period),
+                back,
+            )
+        return back
+
+    def from_plane(self, points: np.ndarray) -> np.ndarray:
+        """Deviations (k, nx) from points (k, 2) of the plane: coordinate and rate, all else at
+        rest."""
+        n = linear_system(self.system).mechanism.nq
+        dx = np.zeros((len(points), 2 * n))
+        dx[:, [n - 1, 2 * n - 1]] = points
+        return dx
+
+    def recovers_in_row(self, row: int) -> np.ndarray:
+        """Which points of this row of the plane's grid are brought back, (POINTS,) bool."""
+        places, speeds = axes(self.system)
+        points = np.column_stack([places, np.full(POINTS, speeds[row])])
+        return self.recovers(self.from_plane(points))
+
+    def largest_lean(self) -> float:
+        """The largest deviation [rad; m] from which it comes back from rest, and from all smaller
+        ones alike, to a thousandth of the plane's width; zero if from none."""
+        low, high = 0.0, SPAN[self.system][0]
+        for _ in range(2):
+            tried = np.linspace(low, high, 41)
+            still = np.column_stack([tried, np.zeros_like(tried)])
+            lost = ~self.recovers(self.from_plane(still))
+            lost[0] = False
+            if not lost.any():
+                return high
+            first = int(np.argmax(lost))
+            low, high = tried[first - 1], tried[first]
+        return float(low)
+
+
+def axes(system: str) -> tuple[np.ndarray, np.ndarray]:
+    """The plane's grid: coordinates (POINTS,) and rates (POINTS,), of deviations."""
+    wide, fast = SPAN[system]
+    return np.linspace(-wide, wide, POINTS), np.linspace(-fast, fast, POINTS)
+
+
+def rates(system: str, x: np.ndarray, u: float) -> np.ndarray:
+    """x' (nx,) in closed form."""
+    dx = np.zeros_like(x)
+    _rates(CODES[system], x, u, dx)
+    return dx
+
+
+@compiled
+def _rates(code: int, x: np.ndarray, u: float, dx: np.ndarray) -> None:
+    """x' = f(x, u) into dx."""
+    n = len(x) // 2
+    for i in range(n):
+        dx[i] = x[n + i]
+    if code == 0:
+        dx[1] = u / mass_on_a_line.MASS
+    elif code == 1:
+        m, length, radius = pendulums.MASS, pendulums.LENGTH, pendulums.RADIUS
+        inertia = m * (3.0 * radius**2 + 4.0 * length**2) / 12.0
+        dx[1] = (u - m * GRAVITY * 0.5 * length * np.sin(x[0])) / inertia
+    else:
+        m, half, radius = cart_pole.POLE, 0.5 * cart_pole.LENGTH, cart_pole.RADIUS
+        inertia = m * (3.0 * radius**2 + 16.0 * half**2) / 12.0
+        sine, cosine = np.sin(x[1]), np.cos(x[1])
+        total, coupling = cart_pole.CART + m, m * half * cosine
+        right = u + m * half * x[3] ** 2 * sine
+        down = -m * GRAVITY * half * sine
+        determinant = total * inertia - coupling**2
+        dx[2] = (inertia * right - coupling * down) / determinant
+        dx[3] = (total * down - coupling * right) / determinant
+
+
+@compiled
+def _judge(
+    code: int,
+    starts: np.ndarray,
+    rest: np.ndarray,
+    gains: np.ndarray,
+    limit: float,
+    shape: np.ndarray,
+    level: float,
+    reach: float,
+    steps: int,
+    most: int,
+    back: np.ndarray,
+) -> None:
+    """One rollout for each start (k, nx), its verdict into back (k,)."""
+    n = len(rest)
+    k1, k2, k3, k4 = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    y, dx = np.zeros(n), np.zeros(n)
+    for which in range(len(starts)):
+        x = rest + starts[which]
+        for tick in range(most):
+            dx[:] = x - rest
+            turn = tick % len(gains)
+            if turn == 0:
+                size = 0.0
+                for i in range(n):
+                    for j in range(n):
+                        size += dx[i] * shape[i, j] * dx[j]
+                if size <= level:
+                    back[which] = True
+                    break
+            u = 0.0
+            for i in range(n):
+                u += gains[turn, i] * dx[i]
+            u = min(max(u, -limit), limit)
+            for _ in range(steps):
+                _rates(code, x, u, k1)
+                for i in range(n):
+                    y[i] = x[i] + 0.5 * STEP * k1[i]
+                _rates(code, y, u, k2)
+                for i in range(n):
+                    y[i] = x[i] + 0.5 * STEP * k2[i]
+                _rates(code, y, u, k3)
+                for i in range(n):
+                    y[i] = x[i] + STEP * k3[i]
+                _rates(code, y, u, k4)
+                for i in range(n):
+                    x[i] += STEP / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+            slid = x[0] if code != 1 else 0.0
+            turned = x[n // 2 - 1] - rest[n // 2 - 1] if code != 0 else 0.0
+            if not (abs(slid) <= reach and abs(turned) <= 4.0 * np.pi):
+                break

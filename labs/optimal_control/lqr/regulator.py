@@ -1,0 +1,165 @@
+"""A linear quadratic regulator for one of the systems at rest, as a policy for all times.
+
+    u = u_eq + K_t (x - x_eq),    K_t from the weights Q, R, Q_f over a horizon N (notes, 2.4)
+
+What happens beyond N the notes leave open; here one may choose:
+
+    steady     K_s of the steady state at every step (2.4.2)
+    window     K_0, K_1, ..., K_(N-1), and then over again
+    receding   K_0 at every step: always N steps to go, as in model predictive control
+"""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from labs.algorithms.riccati import SteadyState, solve, steady_state, steady_state_directly
+from labs.errors import LabError
+from labs.problems.linear_quadratic import LqrPolicy, LqrProblem
+from labs.tasks.regulation.linear_systems import LinearSystem, linear_system
+
+MOST = 20_000
+"""Steps of the recursion towards the steady state."""
+SETTLED = 0.01
+"""Within this share of its steady value an element counts as constant."""
+
+POLICIES = {
+    "steady": "Steady state",
+    "window": "Horizon, then over again",
+    "receding": "Receding horizon",
+}
+FINALS = {"q": "α Q", "p": "α P of the steady state"}
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What fixes a regulator. `weights` are Q's diagonal: of what slides [1/m^2], of what turns
+    [1/rad^2], and of their rates [s^2/m^2, s^2/rad^2]; R = r I."""
+
+    system: str
+    period: float
+    """T [s]."""
+    weights: tuple[float, float, float, float]
+    r: float
+    horizon: int
+    final: str
+    """One of FINALS, what Q_f is a multiple of."""
+    alpha: float
+    policy: str
+    """One of POLICIES."""
+
+
+@dataclass(frozen=True, eq=False)
+class Regulator:
+    """The policy and what is known of it. What cannot be is no error here but `trouble`."""
+
+    setting: Setting
+    problem: LqrProblem
+    optimal: LqrPolicy | None
+    """Over the horizon; None where there is none."""
+    steady: SteadyState | None
+    """None where there is no steady state."""
+    trouble: str
+    """Empty, or a sentence on why there is no such policy."""
+
+    @property
+    def system(self) -> LinearSystem:
+        return linear_system(self.setting.system)
+
+    @cached_property
+    def gains(self) -> np.ndarray:
+        """K (M, nu, nx), to be used in turn."""
+        if self.setting.policy == "steady" and self.steady:
+            return self.steady.gain[None]
+        assert self.optimal is not None
+        return self.optimal.gains[:1] if self.setting.policy == "receding" else self.optimal.gains
+
+    @cached_property
+    def values(self) -> np.ndarray:
+        """P (M, nx, nx): what the policy expects to pay from each of these steps on."""
+        if self.setting.policy == "steady" and self.steady:
+            return self.steady.value[None]
+        assert self.optimal is not None
+        return self.optimal.values[: len(self.gains)]
+
+    @cached_property
+    def growth(self) -> float:
+        """By what factor dx grows or shrinks in a period in the long run, where it is small: the
+        spectral radius of one turn, per period."""
+        p, turn = self.problem, np.eye(self.problem.n)
+        for gain in self.gains:
+            turn = (p.a + p.b @ gain) @ turn
+        return float(np.abs(np.linalg.eigvals(turn)).max() ** (1.0 / len(self.gains)))
+
+    @cached_property
+    def mismatch(self) -> float:
+        """Largest difference of the recursion's P to SciPy's, as a share of the largest entry;
+        -1 where there is no steady state or SciPy finds none."""
+        p = self.problem
+        if self.steady is None:
+            return -1.0
+        try:
+            theirs = steady_state_directly(p.a, p.b, p.q, p.r).value
+        except LabError:
+            return -1.0
+        return float(np.abs(self.steady.value - theirs).max() / np.abs(theirs).max())
+
+    @cached_property
+    def constant(self) -> int:
+        """How many gains of the horizon, from t = 0 on, are the steady one as far as SETTLED."""
+        return settled(self.shares()[1]) + 1
+
+    def shares(self) -> tuple[np.ndarray, np.ndarray]:
+        """How elements of P_t (N + 1, k) and K_t (N, k) come to rest, as shares of their steady
+        values, or of those at t = 0 where there is no steady state: P_ii, and K_1i or, with as
+        many controls as coordinates, K_ii; at most six. An element that rests at zero is left
+        out."""
+        if self.optimal is None:
+            return np.zeros((0, 0)), np.zeros((0, 0))
+        gains, values = self.optimal.gains, self.optimal.values
+        count = min(self.problem.n, 6)
+        pick = np.arange(count)
+        row = pick if gains.shape[1] > 1 else np.zeros(count, int)
+        p, k = values[:, pick, pick], gains[:, row, pick]
+        p_end, k_end = p[0], k[0]
+        if self.steady:
+            p_end, k_end = self.steady.value[pick, pick], self.steady.gain[row, pick]
+        p, k = p[:, p_end != 0.0], k[:, k_end != 0.0]
+        return p / p_end[p_end != 0.0], k / k_end[k_end != 0.0]
+
+    def cost(self, dx: np.ndarray, du: np.ndarray) -> float:
+        """dx' Q dx + du' R du of one step."""
+        return float(dx @ self.problem.q @ dx + du @ self.problem.r @ du)
+
+
+def settled(shares: np.ndarray) -> int:
+    """The last t up to which all shares (N, k) are within SETTLED of 1; -1 if that is none."""
+    off = np.abs(shares - 1.0).max(axis=1, initial=0.0) > SETTLED
+    return int(np.argmax(off)) - 1 if off.any() else len(shares) - 1
+
+
+@lru_cache(maxsize=64)
+def regulator(setting: Setting) -> Regulator:
+    """The regulator of this setting; the same object every time."""
+    system = linear_system(setting.system)
+    a, b = system.linear(setting.period)
+    nq = system.mechanism.nq
+    slide, turn, slide_rate, turn_rate = setting.weights
+    places = [slide if i in system.sliding else turn for i in range(nq)]
+    rates = [slide_rate if i in system.sliding else turn_rate for i in range(nq)]
+    q, r = np.diag([*places, *rates]), setting.r * np.eye(system.nu)
+    steady, trouble = None, ""
+    try:
+        steady = steady_state(a, b, q, r, most=MOST)
+    except LabError as error:
+        if setting.policy == "steady" or setting.final == "p":
+            trouble = f"There is no steady state to regulate to: {error}."
+    rest = steady.value if setting.final == "p" and steady else q
+    problem = LqrProblem(setting.horizon, a, b, q, r, setting.alpha * rest)
+    optimal = None
+    try:
+        optimal = solve(problem)
+    except LabError as error:
+        trouble = trouble or f"There is no policy over the horizon: {error}."
+    return Regulator(setting, problem, optimal, steady, trouble)

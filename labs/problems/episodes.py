@@ -1,0 +1,110 @@
+"""What learning from experience consists of, for the compiled loops of model-free control.
+
+A `Problem` is a finite MDP seen from inside: a learner cannot look at its tables, it only starts
+an episode, applies a control and is told the cost and the next state. A `Rule` says how far an
+estimate moves with what it is told: the n-th update of a pair moves it by
+
+    Q(x, u) <- Q(x, u) + alpha_n delta,    alpha_n = alpha / n^omega
+
+omega = 0 is a constant step; 1/2 < omega <= 1 meets the conditions of Robbins and Monro, sum
+alpha_n = inf and sum alpha_n^2 < inf (notes, 3.6.5)."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from labs.compiled import compiled
+from labs.problems.finite_mdp import FiniteMDP
+from labs.random_numbers import below, uniform
+
+
+class Problem(NamedTuple):
+    """A finite MDP and how its episodes begin and end."""
+
+    cost: np.ndarray
+    """(X, U)."""
+    gamma: float
+    terminal: np.ndarray
+    """(X,) bool: the episode ends here, at no further cost."""
+    successor: np.ndarray
+    """(X, U) int32, or empty where transitions are random."""
+    cumulative: np.ndarray
+    """(U, X, X) sums of P along its rows, or empty where transitions are not random."""
+    starts: np.ndarray
+    """(k,) int64: an episode starts in any of these."""
+    horizon: int
+    """Steps after which an episode is cut. The state there is not terminal: its value counts."""
+
+
+class Rule(NamedTuple):
+    """How estimates move."""
+
+    alpha: float = 0.5
+    """Step size in [0, 1]."""
+    omega: float = 0.0
+    """In [0, 1]."""
+    n: int = 1
+    """Steps of SARSA(n)."""
+    decay: float = 0.0
+    """lambda of SARSA(lambda), in [0, 1]."""
+    replacing: bool = False
+    """A pair's trace is set to 1 at a visit instead of growing by 1."""
+    offline: bool = False
+    """The values stand still through an episode and take all its updates at its end."""
+    limit: float = 1e12
+    """An estimate beyond this magnitude diverges: the episode is broken off."""
+
+
+def problem(mdp: FiniteMDP, starts: Sequence[int], horizon: int) -> Problem:
+    """The episodes of an MDP that start in one of `starts`."""
+    certain = mdp.deterministic
+    return Problem(
+        cost=np.ascontiguousarray(mdp.C, float),
+        gamma=float(mdp.gamma),
+        terminal=mdp.terminal,
+        successor=mdp.successors if certain else np.zeros((0, 0), np.int32),
+        cumulative=np.zeros((0, 0, 0)) if certain else mdp.cumulative,
+        starts=np.array(starts, np.int64),
+        horizon=int(horizon),
+    )
+
+
+@compiled
+def begin(problem: Problem, state: np.ndarray) -> int:
+    """A state to start from."""
+    many = len(problem.starts)
+    return int(problem.starts[0 if many == 1 else below(state, many)])
+
+
+@compiled
+def transition(problem: Problem, x: int, u: int, state: np.ndarray) -> int:
+    """The next state."""
+    if problem.successor.size:
+        return int(problem.successor[x, u])
+    return _drawn(problem, x, u, state)
+
+
+@compiled
+def _drawn(problem: Problem, x: int, u: int, state: np.ndarray) -> int:
+    return int(np.searchsorted(problem.cumulative[u, x], uniform(state), "right"))
+
+
+@compiled
+def least(q: np.ndarray, x: int) -> float:
+    """min_u Q(x, u)."""
+    cost = q[x, 0]
+    for u in range(1, q.shape[1]):
+        cost = min(cost, q[x, u])
+    return float(cost)
+
+
+@compiled
+def step_size(rule: Rule, n: int) -> float:
+    """alpha_n of a pair's n-th update."""
+    return rule.alpha if rule.omega == 0.0 else _shrunk(rule, n)
+
+
+@compiled
+def _shrunk(rule: Rule, n: int) -> float:
+    return float(rule.alpha * float(n) ** -rule.omega)

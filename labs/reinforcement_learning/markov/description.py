@@ -1,0 +1,161 @@
+"""What the structure of a Markov reward process means, said in sentences."""
+
+import numpy as np
+
+from labs.algorithms.markov_chain import Class, is_irreducible
+from labs.reinforcement_learning.markov.reward_process import RewardProcess
+
+TIE = 1e-9
+"""Costs that differ by less are equal."""
+
+
+def about_chain(process: RewardProcess, source: int, target: int) -> str:
+    """The structure of P, and whether it can be edited; a paragraph a line."""
+    return "\n".join(filter(None, [*structure(process), edits(process, source, target)]))
+
+
+def about_value(process: RewardProcess, gamma: float) -> str:
+    """What the discount does to V, and the controls; a paragraph a line."""
+    return "\n".join(filter(None, [value(process, gamma), controls(process, gamma)]))
+
+
+def structure(process: RewardProcess) -> list[str]:
+    """Irreducible or not, periodic or not, and how many stationary distributions there are."""
+    names, classes = process.table.states, process.classes
+    closed = [c for c in classes if c.closed]
+    if is_irreducible(classes):
+        said = ["Irreducible: every state leads to every other."]
+    else:
+        said = ["Not irreducible: not every state leads to every other. " + _parts(names, classes)]
+    if len(closed) == 1:
+        said.append(_one_end(names, process.eigenvalues, closed[0]))
+    else:
+        said.append(
+            f"{_count(len(closed))} closed classes: P has the eigenvalue 1 {_times(len(closed))}, "
+            "and every mixture of their distributions is stationary. Where the walk begins (and "
+            "its luck) decides."
+        )
+        said += [_round_trip(names, c) for c in closed if c.period > 1]
+    return said
+
+
+def value(process: RewardProcess, gamma: float) -> str:
+    """What the discount does to V."""
+    if gamma == 0.0:
+        return "γ = 0, myopic: V = C, the next cost is all that counts."
+    if gamma < 1.0:
+        return (
+            f"γ = {gamma:g} looks about 1/(1 − γ) = {1.0 / (1.0 - gamma):.3g} steps ahead. The "
+            f"eigenvalues of γP stay within {gamma:g}, so I − γP is regular: V is unique."
+        )
+    names, found = process.table.states, process.cost_to_go(gamma)
+    closed = [c for c in process.classes if c.closed]
+    singular = "γ = 1: I − P is singular, for P has the eigenvalue 1. "
+    if found.finite.all():
+        ends = _names(names, np.concatenate([c.states for c in closed]))
+        return (
+            f"{singular}V exists all the same: the chain is sure to end in {ends}, for nothing. "
+            "Put V = 0 there, and the system of the other states is regular."
+        )
+    lost = np.flatnonzero(~found.finite)
+    mean = process.far @ process.C  # of a step in the long run
+    rates = sorted({round(float(rate), 3) + 0.0 for rate in mean[lost]})
+    which = "every state" if len(lost) == len(names) else _names(names, lost)
+    if rates == [0.0]:
+        return (
+            f"{singular}From {which} costs come and go for ever. Their mean is 0, so that V = C + "
+            "P V has infinitely many solutions, and the sum of costs need not settle. Take γ < 1."
+        )
+    grows = " to ".join(_number(rate) for rate in sorted({rates[0], rates[-1]}))
+    return (
+        f"{singular}From {which} the chain never ends, and in the long run a step costs {grows} "
+        "on average: the sum of costs has no finite value. Take γ < 1."
+    )
+
+
+def controls(process: RewardProcess, gamma: float) -> str:
+    """In which states one control would be cheaper than the policy; empty where there is no
+    choice or no V."""
+    table, found = process.table, process.cost_to_go(gamma)
+    if len(table.controls) == 1 or not found.finite.all():
+        return ""
+    Q = process.action_values(gamma, found.V)
+    best = Q.argmin(axis=1)
+    wins = np.flatnonzero(Q.min(axis=1) < found.V - TIE * (1.0 + np.abs(found.V)))
+    if not len(wins):
+        return "No control is better than this policy: V = min Q in every state."
+    told = [
+        f"{table.controls[best[x]]} in {table.states[x]} "
+        f"({_number(Q[x, best[x]])} < {_number(found.V[x])})"
+        for x in wins
+    ]
+    return f"Once, and then the policy, is cheaper (Q < V): {', '.join(told)}."
+
+
+def edits(process: RewardProcess, source: int, target: int) -> str:
+    """Why the chosen transition cannot be edited; empty where it can."""
+    if len(process.table.controls) > 1:
+        return "These probabilities follow from the policy: they are changed in the table only."
+    if process.has(source, target):
+        return ""
+    missing = max(source, target) + 1
+    return f"There is no state {missing} in this chain: choose a transition between its states."
+
+
+def _parts(names: tuple[str, ...], classes: list[Class]) -> str:
+    closed = [_names(names, c.states) for c in classes if c.closed]
+    passed = np.concatenate([c.states for c in classes if not c.closed] or [np.zeros(0, int)])
+    said = f"Nothing leads out of {' or out of '.join(closed)}."
+    if len(passed):
+        leaves = "is left" if len(passed) == 1 else "are left"
+        said += f" {_names(names, passed)} {leaves} for good sooner or later."
+    return said
+
+
+def _one_end(names: tuple[str, ...], modes: np.ndarray, end: Class) -> str:
+    if end.period > 1:
+        return _round_trip(names, end)
+    magnitudes = np.abs(modes)
+    second = float(magnitudes[1]) if len(magnitudes) > 1 else 0.0
+    if len(magnitudes) == 1:
+        speed = "and there is no other"
+    elif second < 1e-6:
+        speed = "all others are 0: the start is soon forgotten altogether"
+    elif second > 0.999:
+        speed = f"the next has magnitude {second:.4f}: the start is forgotten very slowly"
+    else:
+        half = np.log(0.5) / np.log(second)
+        speed = f"the next has magnitude {second:.3f}: what is left of the start halves " + (
+            "within a step" if half < 1.0 else f"every {half:.2g} steps"
+        )
+    return (
+        "Aperiodic, one stationary distribution π: μ converges to it from every start. One "
+        f"eigenvalue of P is 1, {speed}."
+    )
+
+
+def _round_trip(names: tuple[str, ...], c: Class) -> str:
+    where = "" if len(c.states) == len(names) else f" within {_names(names, c.states)}"
+    return (
+        f"Periodic: ways back{where} take multiples of {c.period} steps. {_count(c.period)} "
+        "eigenvalues lie on the unit circle, and μ goes round for ever; only its mean over time "
+        "settles."
+    )
+
+
+def _names(names: tuple[str, ...], states: np.ndarray) -> str:
+    told = [names[x] for x in sorted(states)]
+    return told[0] if len(told) == 1 else f"{', '.join(told[:-1])} and {told[-1]}"
+
+
+def _number(value: float) -> str:
+    return f"{value:.3g}".replace("-", "−")
+
+
+def _times(n: int) -> str:
+    return "twice" if n == 2 else f"{n} times"
+
+
+def _count(n: int) -> str:
+    words = ("No", "One", "Two", "Three", "Four", "Five", "Six")
+    return words[n] if n < len(words) else str(n)

@@ -1,0 +1,100 @@
+"""What is said of a chain is true of it."""
+
+import pytest
+
+from labs.reinforcement_learning.markov.chains import table_of
+from labs.reinforcement_learning.markov.description import about_chain, about_value
+from labs.reinforcement_learning.markov.reward_process import Edit, RewardProcess, reward_process
+
+
+def process(name: str, first: float = 1.0, own: str = "state, A\nA, 1") -> RewardProcess:
+    return reward_process(table_of(name, 1, own), first, Edit({}, 0, 0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("name", "said", "unsaid"),
+    [
+        ("student", ["Irreducible: every", "Aperiodic, one", "0.754: ", "2.4 steps"], ["Not"]),
+        ("term", ["Not irreducible", "Nothing leads out of Sleep.", "Aperiodic, one"], ["closed"]),
+        ("lights", ["Irreducible", "multiples of 4 steps. Four eigenvalues"], ["Aperiodic"]),
+        (
+            "doors",
+            [
+                "out of Desk and Sofa or out of Tick and Tock. Hall is left for good",
+                "Two closed classes: P has the eigenvalue 1 twice",
+                "ways back within Tick and Tock take multiples of 2 steps. Two eigenvalues",
+            ],
+            ["Irreducible", "Aperiodic"],
+        ),
+        ("machine", ["follow from the policy"], []),
+    ],
+)
+def test_the_structure_in_words(name: str, said: list[str], unsaid: list[str]) -> None:
+    text = about_chain(process(name), 0, 0)
+    for part in said:
+        assert part in text
+    for part in unsaid:
+        assert part not in text
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        ("A,1/2,1/2\nB,1/2,1/2", "all others are 0"),
+        ("A,0.99999,0.00001\nB,0.00001,0.99999", "forgotten very slowly"),
+        ("A,0.6,0.4\nB,0.4,0.6", "0.200: what is left of the start halves within a step"),
+        ("A,0,1\nB,0,1", "all others are 0"),
+    ],
+)
+def test_how_fast_the_start_is_forgotten(rows: str, said: str) -> None:
+    assert said in about_chain(process("table", own=f"state,A,B\n{rows}"), 0, 1)
+
+
+def test_a_single_state_has_no_other_eigenvalue() -> None:
+    assert "there is no other" in about_chain(process("table"), 0, 0)
+
+
+def test_a_transition_that_does_not_exist_is_not_edited() -> None:
+    assert "no state 7 in this chain" in about_chain(process("student"), 0, 6)
+    assert "no state" not in about_chain(process("student"), 0, 5)
+
+
+@pytest.mark.parametrize(
+    ("name", "gamma", "said"),
+    [
+        ("student", 0.0, "γ = 0, myopic: V = C"),
+        ("student", 0.9, "1/(1 − γ) = 10 steps ahead"),
+        (
+            "student",
+            1.0,
+            "From every state the chain never ends, and in the long run a step costs ",
+        ),
+        ("student", 1.0, " costs −0.412 on average"),
+        ("term", 1.0, "V exists all the same: the chain is sure to end in Sleep, for nothing."),
+        ("gambler", 1.0, "sure to end in Rich and Broke, for nothing."),
+        ("doors", 1.0, "Their mean is 0, so that V = C + P V has infinitely many solutions"),
+        ("machine", 0.9, "mend in Worn (37.5 < 49.1), mend in Broken (46.2 < 60)."),
+    ],
+)
+def test_the_value_in_words(name: str, gamma: float, said: str) -> None:
+    assert said in about_value(process(name), gamma)
+
+
+def test_only_gamma_one_is_singular() -> None:
+    for gamma in (0.0, 0.5, 0.99):
+        assert "singular" not in about_value(process("student"), gamma)
+    for name in ("student", "term", "lights", "doors"):
+        assert "I − P is singular" in about_value(process(name), 1.0)
+
+
+def test_some_states_may_have_a_value_and_others_none() -> None:
+    own = "state,cost,A,B,C\nA,1,0,1,0\nB,0,0,1,0\nC,-2,0,0,1"
+    text = about_value(process("table", own=own), 1.0)
+    assert "From C the chain never ends, and in the long run a step costs −2 on average" in text
+
+
+def test_a_policy_nothing_can_improve_on() -> None:
+    own = "state,control,cost,A\nA,go,1,1\nA,stay,2,1"
+    assert "No control is better" in about_value(process("table", own=own), 0.5)
+    worse = about_value(process("table", first=0.0, own=own), 0.5)
+    assert "go in A (3 < 4)." in worse

@@ -1,0 +1,116 @@
+"""Grid worlds: moves by hand, published maps, editing."""
+
+import numpy as np
+import pytest
+
+from labs.errors import LabError
+from labs.tasks.grid_world.map import FALL, MAPS, GridWorld
+
+UP, RIGHT, DOWN, LEFT = range(4)
+
+
+def step(world: GridWorld, row: int, column: int, u: int) -> tuple[int, int]:
+    """The cell a control leads to."""
+    successor, _ = world.table
+    row, column = map(int, world.cells[successor[world.index[row, column], u]])
+    return row, column
+
+
+@pytest.mark.parametrize("name", MAPS)
+@pytest.mark.parametrize("kings", [False, True])
+def test_the_named_maps_are_worlds(name: str, kings: bool) -> None:
+    world = GridWorld.parse(MAPS[name], kings)
+    assert world.text == MAPS[name]
+    assert GridWorld.parse(world.text, kings) == world
+    for slip in (0.0, 0.3):
+        mdp = world.mdp(1.0, slip)
+        assert mdp.can_end.all()
+        assert mdp.C.shape[1] == (8 if kings else 4)
+        assert mdp.deterministic == (slip == 0.0)
+    assert (world.index[tuple(world.cells.T)] == np.arange(mdp.X)).all()
+
+
+def test_edges_and_walls_stop() -> None:
+    world = GridWorld.parse("S.#\n..G")
+    assert step(world, 0, 0, UP) == (0, 0)
+    assert step(world, 0, 0, LEFT) == (0, 0)
+    assert step(world, 0, 1, RIGHT) == (0, 1)
+    assert step(world, 0, 1, DOWN) == (1, 1)
+    assert step(world, 1, 1, RIGHT) == (1, 2)
+    assert step(world, 1, 2, LEFT) == (1, 2), "the goal is terminal"
+    np.testing.assert_array_equal(world.mdp(0.9).terminal, [False, False, False, False, True])
+    # A diagonal slides along a wall.
+    kings = GridWorld.parse("S.#\n..G", kings=True)
+    assert step(kings, 1, 1, 4) == (1, 2), "up and right: first right"
+    assert step(kings, 0, 1, 5) == (1, 1), "down and right: right is a wall"
+
+
+def test_the_wind_carries_upwards() -> None:
+    world = GridWorld.parse(MAPS["windy"])
+    assert world.wind == (0, 0, 0, 1, 1, 1, 2, 2, 1, 0)
+    assert step(world, 3, 3, RIGHT) == (2, 4)
+    assert step(world, 3, 6, RIGHT) == (1, 7)
+    assert step(world, 3, 6, DOWN) == (2, 6)
+    assert step(world, 0, 6, LEFT) == (0, 5)
+    assert step(world, 6, 3, DOWN) == (6, 3)
+    assert world.kind(world.start) == "S"
+
+
+def test_the_wind_stops_at_a_wall() -> None:
+    world = GridWorld.parse("..\n#.\n..\nSG\n20")
+    assert step(world, 3, 0, UP) == (2, 0)
+
+
+def test_a_fall_costs_and_leads_back() -> None:
+    world = GridWorld.parse(MAPS["cliff"])
+    assert len(world.cells) == 38
+    successor, cost = world.table
+    x = int(world.index[2, 5])
+    assert (successor[x, DOWN], cost[x, DOWN]) == (world.start, FALL)
+    assert (successor[world.start, RIGHT], cost[world.start, RIGHT]) == (world.start, FALL)
+    assert cost[x, RIGHT] == 1.0
+    laid = world.on_map(np.arange(38.0), -1.0)
+    assert laid[3, 5] == -1.0
+    assert laid[3, 11] == 37.0
+
+
+def test_slip_mixes_the_controls() -> None:
+    world = GridWorld.parse("...\nS..\n..G")
+    mdp = world.mdp(0.9, slip=0.4)
+    row = mdp.probabilities[RIGHT, world.index[1, 1]]
+    for cell, wanted in (((1, 2), 0.7), ((0, 1), 0.1), ((2, 1), 0.1), ((1, 0), 0.1)):
+        assert row[world.index[cell]] == pytest.approx(wanted)
+    cliff = GridWorld.parse(MAPS["cliff"])
+    wanted = 1.0 + 0.4 / 4 * (FALL - 1.0)
+    assert cliff.mdp(0.9, 0.4).C[cliff.index[2, 5], RIGHT] == pytest.approx(wanted)
+
+
+def test_cells_are_edited() -> None:
+    world = GridWorld.parse("S.\n.G")
+    assert world.changed(0, 1, "#").text == "S#\n.G"
+    assert world.changed(0, 1, "S").text == ".S\n.G"
+    assert world.changed(0, 1, "G").text == "SG\n.."
+    assert GridWorld.parse("G.\n.G").changed(0, 1, "G").text == "GG\n.G"
+    with pytest.raises(LabError, match="no goal"):
+        world.changed(1, 1, "#")
+    with pytest.raises(LabError, match="no start"):
+        world.changed(0, 1, "C").changed(0, 0, ".")
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "at least one row"),
+        ("012", "at least one row"),
+        ("S.\n.G.", "row 2 of the map, '.G.', has 3 cells and the first 2"),
+        ("S.\n.x\n.G", "row 2 of the map has 'x'"),
+        ("SG\n012", "the wind has 3 digits: one for each of 2"),
+        ("SS\n.G", "2 starts"),
+        ("S.", "no goal"),
+        (".C\n.G", "no start"),
+        ("G" * 17, "too large"),
+    ],
+)
+def test_what_is_no_map_is_refused(text: str, sentence: str) -> None:
+    with pytest.raises(LabError, match=sentence):
+        GridWorld.parse(text)

@@ -1,12 +1,12 @@
 """Tunables: declared once, they become a slider, a validated field, a CLI option and a link.
 
-A lab's parameters are a frozen pydantic model whose fields are made by `knob` (a number on a
-slider), `choice` (one of a few named values), `toggle` (on or off) or `text`.
+A lab's parameters are a frozen pydantic model whose fields are made by a `Group`: `knob` (a number
+on a slider), `choice` (one of a few named values), `toggle` (on or off) or `text`.
 """
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
@@ -107,72 +107,89 @@ class Text(Tunable):
     with a `field_validator` that raises ValueError, its message a sentence that helps."""
 
     rows: int
-    most: int
+    max_length: int
     """Characters."""
 
 
-def knob(
-    default: float,
-    low: float,
-    high: float,
-    *,
-    symbol: str,
-    unit: str,
-    help: str,
-    label: str = "",
-    group: str = "",
-    step: float = 0.0,
-    scale: Scale = "linear",
-    effect: Effect = "live",
-) -> Any:
-    """A number in [low, high] with a slider. `step` is the slider's grain (0: a thousandth)."""
-    tunable = Knob(help, label or symbol, symbol, group, effect, unit, low, high, step, scale)
-    return _field(default, tunable, ge=low, le=high, allow_inf_nan=False)
+@dataclass(frozen=True)
+class Group:
+    """Tunables that stand together under a heading; each is a field and its docstring, its help:
 
+        WEIGHTS = Group("Weights", effect="solve")
 
-def choice(
-    default: Value,
-    options: Mapping[Any, str],
-    *,
-    help: str,
-    label: str,
-    symbol: str = "",
-    unit: str = "",
-    group: str = "",
-    effect: Effect = "live",
-) -> Any:
-    """One of a few values; `options` maps each value to the words shown for it."""
-    tunable = Choice(help, label, symbol, group, effect, options, unit)
-    return _field(default, tunable, json_schema_extra={"enum": list(options)})
+        class LqrParams(Params):
+            r: float = WEIGHTS.knob(0.1, 1e-4, 1e4, "r", "1/N²", "Control", scale="log")
+            \"\"\"R = r I: what force or torque costs.\"\"\"
 
+    A tunable may have another `effect` than its group, and its `help` may be an argument where a
+    docstring cannot say it. Without a label a tunable shows its symbol."""
 
-def toggle(
-    default: bool, *, help: str, label: str, group: str = "", effect: Effect = "live"
-) -> Any:
-    """On or off."""
-    return _field(default, Toggle(help, label, "", group, effect))
+    name: str = ""
+    effect: Effect = "live"
 
+    def knob(
+        self,
+        default: float,
+        low: float,
+        high: float,
+        symbol: str,
+        unit: str = "",
+        label: str = "",
+        *,
+        step: float = 0.0,
+        scale: Scale = "linear",
+        effect: Effect | None = None,
+        help: str = "",
+    ) -> Any:
+        """A number in [low, high] with a slider. `step` is the slider's grain (0: a thousandth)."""
+        shared = (help, label or symbol, symbol, self.name, effect or self.effect)
+        tunable = Knob(*shared, unit, low, high, step, scale)
+        return _field(default, tunable, ge=low, le=high, allow_inf_nan=False)
 
-def text(
-    default: str,
-    *,
-    help: str,
-    label: str,
-    symbol: str = "",
-    group: str = "",
-    rows: int = 1,
-    most: int = TEXT_LENGTH,
-    effect: Effect = "live",
-) -> Any:
-    """A text of at most `most` characters (up to LONGEST_TEXT), shown in `rows` lines."""
-    if not 1 <= most <= LONGEST_TEXT:
-        raise ValueError(f"most = {most}: a text holds from 1 to {LONGEST_TEXT} characters")
-    tunable = Text(help, label, symbol, group, effect, rows, most)
-    return _field(default, tunable, max_length=most)
+    def choice(
+        self,
+        default: Value,
+        options: Mapping[Any, str],
+        label: str,
+        symbol: str = "",
+        unit: str = "",
+        *,
+        effect: Effect | None = None,
+        help: str = "",
+    ) -> Any:
+        """One of a few values; `options` maps each value to the words shown for it."""
+        tunable = Choice(help, label, symbol, self.name, effect or self.effect, options, unit)
+        return _field(default, tunable, json_schema_extra={"enum": list(options)})
+
+    def toggle(
+        self, default: bool, label: str, *, effect: Effect | None = None, help: str = ""
+    ) -> Any:
+        """On or off."""
+        return _field(default, Toggle(help, label, "", self.name, effect or self.effect))
+
+    def text(
+        self,
+        default: str,
+        label: str,
+        symbol: str = "",
+        *,
+        rows: int = 1,
+        max_length: int = TEXT_LENGTH,
+        effect: Effect | None = None,
+        help: str = "",
+    ) -> Any:
+        """A text of at most `max_length` characters (up to LONGEST_TEXT), shown in `rows` lines."""
+        if not 1 <= max_length <= LONGEST_TEXT:
+            raise ValueError(
+                f"max_length = {max_length}: a text holds from 1 to {LONGEST_TEXT} characters"
+            )
+        shared = (help, label, symbol, self.name, effect or self.effect)
+        return _field(default, Text(*shared, rows, max_length), max_length=max_length)
 
 
 def _field(default: Value, tunable: Tunable, **constraints: Any) -> Any:
-    field: FieldInfo = Field(default, description=tunable.help, **constraints)
+    # Without a description here, pydantic takes the field's docstring.
+    field: FieldInfo = Field(default, description=tunable.help or None, **constraints)
     field.metadata.append(tunable)
     return field
 
@@ -180,7 +197,13 @@ def _field(default: Value, tunable: Tunable, **constraints: Any) -> Any:
 class Params(BaseModel):
     """The tunables of one lab: frozen, validated, every field with a default."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", strict=True, validate_default=True)
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        strict=True,
+        validate_default=True,
+        use_attribute_docstrings=True,
+    )
 
     tunables: ClassVar[Mapping[str, Tunable]] = {}
 
@@ -188,14 +211,17 @@ class Params(BaseModel):
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
         super().__pydantic_init_subclass__(**kwargs)
         cls.tunables = {
-            name: entry
+            name: replace(entry, help=" ".join((field.description or "").split()))
             for name, field in cls.model_fields.items()
             for entry in field.metadata
             if isinstance(entry, Tunable)
         }
         bare = sorted(set(cls.model_fields) - set(cls.tunables))
         if bare:
-            raise TypeError(f"{cls.__name__}: make {', '.join(bare)} with knob, choice or toggle")
+            raise TypeError(f"{cls.__name__}: make {', '.join(bare)} with a Group")
+        silent = [name for name, tunable in cls.tunables.items() if not tunable.help]
+        if silent:
+            raise TypeError(f"{cls.__name__}: {', '.join(silent)} lacks a docstring, its help")
 
     @field_validator("*")
     @classmethod

@@ -4,6 +4,8 @@ time) or `fields` (asked for a few times a second) returns. Symbols are TeX, uni
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+Guide = Literal["none", "imaginary-axis", "left-half-plane", "unit-circle"]
+
 
 @dataclass(frozen=True)
 class Line:
@@ -14,61 +16,77 @@ class Line:
     style: Literal["solid", "dash", "limit"] = "solid"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class TimeSeries:
-    """Measured channels over time. `select` names what a vector's components are ("joint").
-    `stacked` lays the solid lines of one component on top of one another as areas, what is
-    negative below zero; while all are chosen, those of component `lead`."""
+    """Measured channels over time: `TimeSeries("Error", "rad", Line("error", "e"))`. `select` names
+    what a vector's components are ("joint"). `stacked` lays the solid lines of one component on
+    top of one another as areas, what is negative below zero; while all are chosen, those of
+    component `lead`."""
 
     title: str
     unit: str
     lines: tuple[Line, ...]
-    select: str = ""
-    stacked: bool = False
-    lead: int = 0
+    select: str
+    stacked: bool
+    lead: int
 
-
-@dataclass(frozen=True)
-class Curve:
-    """y over x, both 1-D fields: a trajectory in a plane, eigenvalues as points."""
-
-    title: str
-    x: str
-    y: str
-    x_label: str
-    y_label: str
-    points: bool = False
-    guide: Literal["none", "imaginary-axis", "unit-circle"] = "none"
+    def __init__(
+        self,
+        title: str,
+        unit: str,
+        *lines: Line,
+        select: str = "",
+        stacked: bool = False,
+        lead: int = 0,
+    ) -> None:
+        _set(self, title=title, unit=unit, lines=lines, select=select, stacked=stacked, lead=lead)
 
 
 @dataclass(frozen=True)
 class Trace:
-    """One line or set of points among `Curves`: y over x, both 1-D fields of one length, which
-    may change and be 0. "marked" is a line with its points. Without a label it stays out of the
-    legend; `note` names a field of one number (or none) that stands behind the label. `series`
-    is its colour, 1 to 8, or 0 for ink."""
+    """One line or set of points among `Curves`: y over x, 1-D fields of one length, which may
+    change and be 0. With y of shape (n, k) it is k curves over the same x, each of a colour of its
+    own. "marked" is a line with its points. Without a label it stays out of the legend; `note`
+    names a field of one number (or none) for each curve, that stands behind the label. `series` is
+    its colour, or that of the first curve, 1 to 8, or 0 for ink."""
 
     x: str
     y: str
-    label: str = ""
+    label: str | tuple[str, ...] = ""
+    """Of k curves a name each, or one name in which {} stands for the number of the curve."""
     style: Literal["line", "marked", "points", "dash"] = "line"
     series: int = 0
     note: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Curves:
-    """Several traces in one chart. On a logarithmic axis what is not positive is left out.
-    `equal` gives both axes one scale; the guide is as in `Curve`."""
+    """Traces in one chart: a trajectory in a plane, eigenvalues as points, errors over steps. On a
+    logarithmic axis what is not positive is left out. `equal` gives both axes one scale; the guide
+    is the line or the circle that parts the stable from the unstable."""
 
     title: str
-    traces: tuple[Trace, ...]
     x_label: str
     y_label: str
-    log_x: bool = False
-    log_y: bool = False
-    guide: Literal["none", "imaginary-axis", "unit-circle"] = "none"
-    equal: bool = False
+    traces: tuple[Trace, ...]
+    log_x: bool
+    log_y: bool
+    guide: Guide
+    equal: bool
+
+    def __init__(
+        self,
+        title: str,
+        x_label: str,
+        y_label: str,
+        *traces: Trace,
+        log_x: bool = False,
+        log_y: bool = False,
+        guide: Guide = "none",
+        equal: bool = False,
+    ) -> None:
+        labels = {"title": title, "x_label": x_label, "y_label": y_label}
+        _set(self, **labels, traces=traces, log_x=log_x, log_y=log_y, guide=guide, equal=equal)
 
 
 @dataclass(frozen=True)
@@ -128,7 +146,7 @@ class Note:
     note: str
 
 
-Plot = TimeSeries | Curve | Curves | HeatMap | Matrix | Bars | Readout | Note
+Plot = TimeSeries | Curves | HeatMap | Matrix | Bars | Readout | Note
 
 
 def measured(plot: Plot) -> tuple[str, ...]:
@@ -141,8 +159,6 @@ def measured(plot: Plot) -> tuple[str, ...]:
 def pictured(plot: Plot) -> tuple[str, ...]:
     """The channels of `Lab.fields` and `Lab.notes` a plot shows."""
     match plot:
-        case Curve(x=x, y=y):
-            return (x, y)
         case Curves(traces=traces):
             named = (name for trace in traces for name in (trace.x, trace.y, trace.note))
             return tuple(name for name in named if name)
@@ -161,3 +177,9 @@ def pictured(plot: Plot) -> tuple[str, ...]:
 def describe(plot: Plot) -> dict[str, Any]:
     """A plot as plain JSON data; `kind` tells which."""
     return {"kind": type(plot).__name__} | asdict(plot)
+
+
+def _set(plot: Any, **values: Any) -> None:
+    """The fields of a frozen plot, as its own __init__ sets them."""
+    for name, value in values.items():
+        object.__setattr__(plot, name, value)

@@ -20,7 +20,7 @@ from labs.engine.snapshots import leaves
 from labs.engine.solution import Solution
 from labs.lab import Inputs, Snapshot, State
 from labs.params import Choice, Knob, Params, Text, Toggle, Value
-from labs.plots import Bars, Curve, Curves, HeatMap, Matrix, Note, Readout, TimeSeries
+from labs.plots import Bars, Curves, HeatMap, Matrix, Note, Readout, TimeSeries, Trace
 from labs.scene import Color
 from labs.shapes import Body
 from server.articles import render, tex
@@ -466,19 +466,22 @@ def test_plots_name_real_channels(entry: Entry) -> None:
                 for line in lines:
                     tex(line.symbol)
                 assert unit == unit.strip()
-            case Curve(x=x, y=y):
-                assert np.ndim(pictured[x]) == 1
-                assert np.shape(pictured[x]) == np.shape(pictured[y])
             case Curves(traces=traces, log_x=log_x, log_y=log_y, equal=equal):
                 for trace in traces:
-                    assert np.ndim(pictured[trace.x]) == 1
-                    assert np.shape(pictured[trace.x]) == np.shape(pictured[trace.y]), trace
+                    x, y = np.asarray(pictured[trace.x]), np.asarray(pictured[trace.y])
+                    assert x.ndim == 1, trace
+                    assert y.ndim in (1, 2), trace
+                    assert len(x) == len(y), trace
                     assert 0 <= trace.series <= 8, trace
                     assert trace.label or not trace.note, f"{trace}: a note stands by a label"
+                    if isinstance(trace.label, tuple):
+                        assert y.shape[1:] == (len(trace.label),), trace
+                    elif y.ndim == 2:
+                        assert "{}" in trace.label or not trace.label, trace
                     if trace.note:
-                        assert np.shape(pictured[trace.note]) in {(0,), (1,)}, trace
-                labels = [trace.label for trace in traces if trace.label]
-                assert labels, f"{plot}: a legend names what is drawn"
+                        assert len(pictured[trace.note]) in {0, *(y.shape[1:] or (1,))}, trace
+                labels = [name for trace in traces for name in named(trace)]
+                assert labels or len(traces) == 1, f"{plot}: a legend names what is drawn"
                 assert len(labels) == len(set(labels)), plot
                 assert not (equal and (log_x or log_y)), f"{plot}: one scale is linear"
             case HeatMap(x=x, y=y, z=z):
@@ -496,6 +499,12 @@ def test_plots_name_real_channels(entry: Entry) -> None:
             case Readout(channel=channel, label=label):
                 assert label
                 assert np.ndim(measured.get(channel, 0.0)) == 0, "a read-out is one number"
+
+
+def named(trace: Trace) -> tuple[str, ...]:
+    """The labels of a trace in the legend."""
+    labels = trace.label if isinstance(trace.label, tuple) else (trace.label,)
+    return tuple(filter(None, labels))
 
 
 @every_lab

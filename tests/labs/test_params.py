@@ -10,16 +10,24 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from labs.errors import ParameterError
-from labs.params import LOG_SPAN, LONGEST_TEXT, Knob, Params, Scale, choice, knob, text, toggle
+from labs.params import LOG_SPAN, LONGEST_TEXT, Group, Knob, Params, Scale
+
+KNOBS = Group()
 
 
 class Sample(Params):
-    kp: float = knob(100.0, 0.0, 2000.0, symbol="k_p", unit="N·m/rad", help="Gain.", scale="log")
-    decay: float = knob(0.1, 0.001, 10.0, symbol="a", unit="", help="Rate.", scale="log")
-    angle: float = knob(0.0, -3.0, 3.0, symbol="q", unit="rad", help="Angle.", label="angle")
-    law: str = choice("pid", {"pid": "PID", "pd": "PD"}, help="Law.", label="Law", effect="restart")
-    period: float = choice(0.001, {0.001: "1 ms", 0.01: "10 ms"}, help="T.", label="T", unit="s")
-    limits: bool = toggle(True, help="Cut.", label="Limits", effect="solve")
+    kp: float = KNOBS.knob(100.0, 0.0, 2000.0, "k_p", "N·m/rad", scale="log")
+    """Gain."""
+    decay: float = KNOBS.knob(0.1, 0.001, 10.0, "a", scale="log")
+    """Rate."""
+    angle: float = KNOBS.knob(0.0, -3.0, 3.0, "q", "rad", "angle")
+    """Angle."""
+    law: str = KNOBS.choice("pid", {"pid": "PID", "pd": "PD"}, "Law", effect="restart")
+    """Law."""
+    period: float = KNOBS.choice(0.001, {0.001: "1 ms", 0.01: "10 ms"}, "T", "", "s")
+    """T."""
+    limits: bool = KNOBS.toggle(True, "Limits", effect="solve")
+    """Cut."""
 
 
 def a_knob(low: float, high: float, scale: Scale) -> Knob:
@@ -176,16 +184,18 @@ def test_differing_names_what_differs() -> None:
 
 
 def test_a_bare_field_is_refused_when_the_class_is_made() -> None:
-    with pytest.raises(TypeError, match="Bare: make other with knob, choice or toggle"):
+    with pytest.raises(TypeError, match="Bare: make other with a Group"):
 
         class Bare(Params):
-            kp: float = knob(1.0, 0.0, 2.0, symbol="k", unit="", help="Gain.")
+            kp: float = KNOBS.knob(1.0, 0.0, 2.0, "k")
+            """Gain."""
             other: float = 1.0
 
 
 def test_a_default_out_of_range_is_refused() -> None:
     class Wrong(Params):
-        kp: float = knob(3.0, 0.0, 2.0, symbol="k", unit="", help="Gain.")
+        kp: float = KNOBS.knob(3.0, 0.0, 2.0, "k")
+        """Gain."""
 
     with pytest.raises(ValidationError):
         Wrong()
@@ -193,7 +203,8 @@ def test_a_default_out_of_range_is_refused() -> None:
 
 def test_a_subclass_keeps_the_tunables_of_its_base() -> None:
     class More(Sample):
-        mass: float = knob(1.0, 0.1, 2.0, symbol="m", unit="kg", help="Mass.")
+        mass: float = KNOBS.knob(1.0, 0.1, 2.0, "m", "kg")
+        """Mass."""
 
     assert list(More.tunables) == [*Sample.tunables, "mass"]
 
@@ -202,8 +213,10 @@ def test_a_subclass_keeps_the_tunables_of_its_base() -> None:
 
 
 class Texts(Params):
-    short: str = text("a", help="S.", label="S")
-    long: str = text("b", help="L.", label="L", most=LONGEST_TEXT)
+    short: str = KNOBS.text("a", "S")
+    """S."""
+    long: str = KNOBS.text("b", "L", max_length=LONGEST_TEXT)
+    """L."""
 
 
 @pytest.mark.parametrize(("name", "most"), [("short", 400), ("long", 4000)])
@@ -211,14 +224,14 @@ def test_a_text_has_a_length(name: str, most: int) -> None:
     assert getattr(Texts().change({name: "é" * most}), name) == "é" * most
     with pytest.raises(ParameterError, match=f"{name}: .*at most {most} characters"):
         Texts().change({name: "é" * (most + 1)})
-    described = {tunable["name"]: tunable["most"] for tunable in Texts.describe()}
+    described = {tunable["name"]: tunable["max_length"] for tunable in Texts.describe()}
     assert described[name] == most
 
 
 @pytest.mark.parametrize("most", [0, LONGEST_TEXT + 1])
 def test_no_text_is_longer_than_a_link(most: int) -> None:
     with pytest.raises(ValueError, match="from 1 to 4000"):
-        text("a", help="T.", label="T", most=most)
+        KNOBS.text("a", "T", max_length=most, help="T.")
 
 
 # Text and JSON --------------------------------------------------------------------------------

@@ -24,7 +24,7 @@ from labs.appendix.integration.convergence import slope
 from labs.errors import LabError
 from labs.lab import Inputs, Lab, Measurement, Snapshot, State
 from labs.models.pendulums import GRAY, LENGTH, Pendulum, hanging, pendulum
-from labs.params import Params, Value, choice, knob, text
+from labs.params import Group, Params, Value
 from labs.plots import Bars, Curves, Line, Readout, TimeSeries, Trace
 from labs.scene import Scene
 
@@ -58,69 +58,30 @@ FASTEST = 40.0
 """[rad/s] a pendulum faster than this has blown up; one that falls from upright makes 11."""
 
 
+SYSTEM = Group("System", effect="restart")
+METHODS_GROUP = Group("Methods", effect="solve")
+
+
 class IntegrationParams(Params):
     """What the user can turn."""
 
-    system: str = choice(
-        "pendulum",
-        SYSTEMS,
-        label="System",
-        group="System",
-        effect="restart",
-        help="What every method integrates: one rod of half a metre, or two.",
+    system: str = SYSTEM.choice("pendulum", SYSTEMS, "System")
+    """What every method integrates: one rod of half a metre, or two."""
+    start: float = SYSTEM.knob(1.0, 0.0, 3.1, "q(0)", "rad", "Start angle", step=0.01)
+    """Of the first rod from hanging; the second starts in line with it. All start at rest."""
+    friction: float = SYSTEM.knob(
+        0.0, 0.0, 5.0, "b", "N·m·s/rad", "Friction", scale="log", effect="solve"
     )
-    start: float = knob(
-        1.0,
-        0.0,
-        3.1,
-        symbol="q(0)",
-        unit="rad",
-        label="Start angle",
-        group="System",
-        step=0.01,
-        effect="restart",
-        help="Of the first rod from hanging; the second starts in line with it. All start at rest.",
+    """Viscous, at every hinge. It moves the eigenvalues to the left."""
+    h: float = METHODS_GROUP.knob(0.04, 0.002, 1.0, "h", "s", "Step", scale="log", effect="live")
+    """Of all methods alike. A pendulum stands still between two steps."""
+    implicit: str = METHODS_GROUP.choice("implicit-midpoint", IMPLICIT, "Implicit method")
+    """Which one the gray pendulum follows; its stages are found by Newton's method."""
+    tableau: str = METHODS_GROUP.text(
+        "0 |\n1/3 | 1/3\n2/3 | 0 2/3\n| 1/4 0 3/4", "Your tableau", rows=6
     )
-    friction: float = knob(
-        0.0,
-        0.0,
-        5.0,
-        symbol="b",
-        unit="N·m·s/rad",
-        label="Friction",
-        group="System",
-        scale="log",
-        effect="solve",
-        help="Viscous, at every hinge. It moves the eigenvalues to the left.",
-    )
-    h: float = knob(
-        0.04,
-        0.002,
-        1.0,
-        symbol="h",
-        unit="s",
-        label="Step",
-        group="Methods",
-        scale="log",
-        help="Of all methods alike. A pendulum stands still between two steps.",
-    )
-    implicit: str = choice(
-        "implicit-midpoint",
-        IMPLICIT,
-        label="Implicit method",
-        group="Methods",
-        effect="solve",
-        help="Which one the gray pendulum follows; its stages are found by Newton's method.",
-    )
-    tableau: str = text(
-        "0 |\n1/3 | 1/3\n2/3 | 0 2/3\n| 1/4 0 3/4",
-        label="Your tableau",
-        group="Methods",
-        rows=6,
-        effect="solve",
-        help="A row a stage, c | a ..., then | b ... at the end. Fractions go, and so do weights "
-        "on and above the diagonal (implicit).",
-    )
+    """A row a stage, c | a ..., then | b ... at the end. Fractions go, and so do weights on and
+    above the diagonal (implicit)."""
 
     @field_validator("tableau")
     @classmethod
@@ -198,7 +159,7 @@ def _traces(
 def _errors(title: str, x: str, y: str, note: str) -> Curves:
     """Errors over steps or costs, doubly logarithmic."""
     label = "step h [s]" if x == "ladder" else "evaluations of f in half a second"
-    return Curves(title, _traces(x, y, "marked", note), label, "error", log_x=True, log_y=True)
+    return Curves(title, label, "error", *_traces(x, y, "marked", note), log_x=True, log_y=True)
 
 
 class Integration(Lab[IntegrationParams, IntegrationState]):
@@ -216,49 +177,32 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
         TimeSeries(
             "Sideways position of the tip",
             "m",
-            (
-                *_lines("tip"),
-                Line("tip", r"\text{exact}", "limit"),
-            ),
+            *_lines("tip"),
+            Line("tip", r"\text{exact}", "limit"),
         ),
-        TimeSeries(
-            "Energy drift, decades",
-            "log₁₀ of a fall's energy",
-            _lines("drift"),
-        ),
+        TimeSeries("Energy drift, decades", "log₁₀ of a fall's energy", *_lines("drift")),
         _errors("Global error after half a second", "ladder", "global", "order"),
         _errors("Local error of one step", "ladder", "local", "local_order"),
         _errors("Global error against cost", "cost", "global", ""),
         Curves(
             "Growth of a small swing in one step",
-            (
-                *_traces("grid", "growth", "line", "limit"),
-                *(replace(t, label="") for t in _traces("limit", "one", "points")),
-                Trace("now", "all", "h now", "dash"),
-            ),
             "step h [s]",
             "factor",
+            *_traces("grid", "growth", "line", "limit"),
+            *(replace(t, label="") for t in _traces("limit", "one", "points")),
+            Trace("now", "all", "h now", "dash"),
             log_x=True,
         ),
         Curves(
             "Region of absolute stability",
-            (
-                *(t for t in _traces("edge_re", "edge_im", "line") if t.label != METHODS["semi"]),
-                Trace("z_re", "z_im", "hλ", "points"),
-            ),
             "Re z",
             "Im z",
+            *(t for t in _traces("edge_re", "edge_im", "line") if t.label != METHODS["semi"]),
+            Trace("z_re", "z_im", "hλ", "points"),
             guide="imaginary-axis",
             equal=True,
         ),
-        TimeSeries(
-            "Energy",
-            "J",
-            (
-                *_lines("energy"),
-                Line("energy", r"\text{exact}", "limit"),
-            ),
-        ),
+        TimeSeries("Energy", "J", *_lines("energy"), Line("energy", r"\text{exact}", "limit")),
         Bars("Order conditions of your tableau", "conditions", r"\text{off by}", ""),
         Readout("own_order", "Order of your tableau", ""),
         Readout("own_sum", "Sum of its b", ""),

@@ -12,7 +12,7 @@ from labs.algorithms.ddp import Iterate, Options
 from labs.lab import Action, Inputs, Lab, Measurement, Snapshot, State
 from labs.models.mechanisms import Mechanism, mechanism
 from labs.optimal_control.ddp.history import KEPT, History, spread
-from labs.params import Knob, Value, choice, knob
+from labs.params import Group, Knob, Value
 from labs.plots import Curves, Line, Readout, TimeSeries, Trace
 from labs.problems.optimal_control import Problem
 from labs.scene import Scene
@@ -46,162 +46,45 @@ BEFORE = (2, 4, 8)
 """Which earlier iterations the phase portrait shows."""
 
 
+SOLVER = Group("Solver", effect="solve")
+WORLD = Group("World")
+
+
 class DdpParams(MotionParams):
     """What the user can turn."""
 
-    method: str = choice(
-        "ilqr",
-        {"ilqr": "iLQR (Gauss-Newton)", "ddp": "DDP (second derivatives)"},
-        label="Method",
-        group="Solver",
-        effect="solve",
-        help="Whether the second derivatives of the dynamics enter.",
+    method: str = SOLVER.choice(
+        "ilqr", {"ilqr": "iLQR (Gauss-Newton)", "ddp": "DDP (second derivatives)"}, "Method"
     )
-    start: str = choice(
-        "warm",
-        {"warm": "Warm: the present solution", "cold": "Cold: the first guess"},
-        label="Start",
-        group="Solver",
-        effect="solve",
-        help="What a change of the problem is solved from.",
+    """Whether the second derivatives of the dynamics enter."""
+    start: str = SOLVER.choice(
+        "warm", {"warm": "Warm: the present solution", "cold": "Cold: the first guess"}, "Start"
     )
-    guess: float = knob(
-        0.0,
-        -1.0,
-        1.0,
-        symbol="A",
-        unit="u_0",
-        label="First guess",
-        group="Solver",
-        step=0.01,
-        effect="solve",
-        help="Size of the controls guessed at first, u = u_ref + A u_0 cos(2 pi f_0 t).",
-    )
-    guess_rate: float = knob(
-        0.0,
-        0.0,
-        2.0,
-        symbol="f_0",
-        unit="Hz",
-        label="Its frequency",
-        group="Solver",
-        step=0.05,
-        effect="solve",
-        help="Of the first guess; at 0 it is a constant push.",
-    )
-    mu: float = knob(
-        0.0,
-        0.0,
-        1e4,
-        symbol=r"\mu",
-        unit="",
-        label="First regularisation",
-        group="Solver",
-        scale="log",
-        effect="solve",
-        help="What is added to the diagonal of Q_uu in the first iteration.",
-    )
-    mu_factor: float = knob(
-        4.0,
-        1.1,
-        20.0,
-        symbol=r"k_\mu",
-        unit="",
-        label="Its factor",
-        group="Solver",
-        scale="log",
-        effect="solve",
-        help="By which mu grows after a bad iteration and shrinks after a good one.",
-    )
-    c1: float = knob(
-        1e-3,
-        1e-6,
-        0.95,
-        symbol="c_1",
-        unit="",
-        group="Solver",
-        scale="log",
-        effect="solve",
-        help="Least part of the expected improvement for which a step is taken.",
-    )
-    c2: float = knob(
-        0.25,
-        1e-3,
-        0.95,
-        symbol="c_2",
-        unit="",
-        group="Solver",
-        scale="log",
-        effect="solve",
-        help="Least part of the expected improvement for which mu shrinks; at least c_1 counts.",
-    )
-    iterations: float = knob(
-        200.0,
-        1.0,
-        300.0,
-        symbol="n_{max}",
-        unit="",
-        label="Most iterations",
-        group="Solver",
-        step=1.0,
-        effect="solve",
-        help="Before the solver stops short.",
-    )
-    payload: float = knob(
-        0.0,
-        0.0,
-        3.0,
-        symbol="m_{load}",
-        unit="kg",
-        label="Payload",
-        group="World",
-        step=0.01,
-        help="A point mass at the tip that the plan does not know of.",
-    )
-    friction: float = knob(
-        0.0,
-        0.0,
-        10.0,
-        symbol="b",
-        unit="N·m·s/rad",
-        label="Friction",
-        group="World",
-        scale="log",
-        help="Viscous friction at every joint that the plan does not know of.",
-    )
-    noise: float = knob(
-        0.0,
-        0.0,
-        0.05,
-        symbol=r"\sigma_x",
-        unit="rad",
-        label="Sensor noise",
-        group="World",
-        scale="log",
-        help="Standard deviation of the measured angles; of the velocities it is 10/s times this.",
-    )
-    noise_torque: float = knob(
-        0.0,
-        0.0,
-        1.0,
-        symbol=r"\sigma_u",
-        unit="u_0",
-        label="Torque noise",
-        group="World",
-        scale="log",
-        help="Standard deviation of what the motors add to the control, the same in both runs.",
-    )
-    push: float = knob(
-        0.5,
-        -5.0,
-        5.0,
-        symbol="p_{push}",
-        unit="N·s",
-        label="Push",
-        group="World",
-        step=0.05,
-        help="Impulse a push gives the tip of both robots, along y.",
-    )
+    """What a change of the problem is solved from."""
+    guess: float = SOLVER.knob(0.0, -1.0, 1.0, "A", "u_0", "First guess", step=0.01)
+    """Size of the controls guessed at first, u = u_ref + A u_0 cos(2 pi f_0 t)."""
+    guess_rate: float = SOLVER.knob(0.0, 0.0, 2.0, "f_0", "Hz", "Its frequency", step=0.05)
+    """Of the first guess; at 0 it is a constant push."""
+    mu: float = SOLVER.knob(0.0, 0.0, 1e4, r"\mu", "", "First regularisation", scale="log")
+    """What is added to the diagonal of Q_uu in the first iteration."""
+    mu_factor: float = SOLVER.knob(4.0, 1.1, 20.0, r"k_\mu", "", "Its factor", scale="log")
+    """By which mu grows after a bad iteration and shrinks after a good one."""
+    c1: float = SOLVER.knob(1e-3, 1e-6, 0.95, "c_1", scale="log")
+    """Least part of the expected improvement for which a step is taken."""
+    c2: float = SOLVER.knob(0.25, 1e-3, 0.95, "c_2", scale="log")
+    """Least part of the expected improvement for which mu shrinks; at least c_1 counts."""
+    iterations: float = SOLVER.knob(200.0, 1.0, 300.0, "n_{max}", "", "Most iterations", step=1.0)
+    """Before the solver stops short."""
+    payload: float = WORLD.knob(0.0, 0.0, 3.0, "m_{load}", "kg", "Payload", step=0.01)
+    """A point mass at the tip that the plan does not know of."""
+    friction: float = WORLD.knob(0.0, 0.0, 10.0, "b", "N·m·s/rad", "Friction", scale="log")
+    """Viscous friction at every joint that the plan does not know of."""
+    noise: float = WORLD.knob(0.0, 0.0, 0.05, r"\sigma_x", "rad", "Sensor noise", scale="log")
+    """Standard deviation of the measured angles; of the velocities it is 10/s times this."""
+    noise_torque: float = WORLD.knob(0.0, 0.0, 1.0, r"\sigma_u", "u_0", "Torque noise", scale="log")
+    """Standard deviation of what the motors add to the control, the same in both runs."""
+    push: float = WORLD.knob(0.5, -5.0, 5.0, "p_{push}", "N·s", "Push", step=0.05)
+    """Impulse a push gives the tip of both robots, along y."""
 
     @property
     def options(self) -> Options:
@@ -254,81 +137,70 @@ class Ddp(Lab[DdpParams, DdpState]):
     plots = (
         Curves(
             "Cost",
-            (
-                Trace("iterations", "cost", "J", "marked"),
-                Trace("stepped", "expected", "expected improvement", "line", 1),
-                Trace("stepped", "actual", "actual improvement", "points", 2),
-            ),
             "iteration",
             "cost",
+            Trace("iterations", "cost", "J", "marked"),
+            Trace("stepped", "expected", "expected improvement", "line", 1),
+            Trace("stepped", "actual", "actual improvement", "points", 2),
             log_y=True,
         ),
         Curves(
             "Line search and regularisation",
-            (
-                Trace("stepped", "alpha", "α", "points", 1),
-                Trace("stepped", "mu", "μ", "marked", 2),
-                Trace("stepped", "gradient", "max |dJ/dU|", "line"),
-            ),
             "iteration",
             "",
+            Trace("stepped", "alpha", "α", "points", 1),
+            Trace("stepped", "mu", "μ", "marked", 2),
+            Trace("stepped", "gradient", "max |dJ/dU|", "line"),
             log_y=True,
         ),
         TimeSeries(
             "Position",
             "rad; m",
-            (
-                Line("q", "q"),
-                Line("q_open", r"q^{\text{open}}", "dash"),
-                Line("q_bar", r"\bar q", "limit"),
-            ),
+            Line("q", "q"),
+            Line("q_open", r"q^{\text{open}}", "dash"),
+            Line("q_bar", r"\bar q", "limit"),
             select="joint",
         ),
         TimeSeries(
             "Control",
             "N·m; N",
-            (Line("u", r"u = \bar u + K (x - \bar x)"), Line("u_bar", r"\bar u", "limit")),
+            Line("u", r"u = \bar u + K (x - \bar x)"),
+            Line("u_bar", r"\bar u", "limit"),
             select="motor",
         ),
         Curves(
             "Phase portrait",
-            (
-                *(
-                    Trace(f"angle_{i}", f"speed_{i}", f"{i} before", "line", 2 + k)
-                    for k, i in reversed(tuple(enumerate(BEFORE)))
-                ),
-                Trace("angle_0", "speed_0", "this iteration", "line", 1),
-                Trace("angle_played", "speed_played", "played with feedback", "dash"),
-            ),
             "angle [rad]",
             "velocity [rad/s]",
+            *(
+                Trace(f"angle_{i}", f"speed_{i}", f"{i} before", "line", 2 + k)
+                for k, i in reversed(tuple(enumerate(BEFORE)))
+            ),
+            Trace("angle_0", "speed_0", "this iteration", "line", 1),
+            Trace("angle_played", "speed_played", "played with feedback", "dash"),
         ),
         Curves(
             "Gains of the first motor",
-            (
-                Trace("gain_t", "gain_q1", "∂u₁/∂q₁", "line", 1),
-                Trace("gain_t", "gain_v1", "∂u₁/∂v₁", "line", 2),
-                Trace("gain_t2", "gain_q2", "∂u₁/∂q₂", "line", 3),
-                Trace("gain_t2", "gain_v2", "∂u₁/∂v₂", "line", 4),
-            ),
             "time in the motion [s]",
             "gain",
+            Trace("gain_t", "gain_q1", "∂u₁/∂q₁", "line", 1),
+            Trace("gain_t", "gain_v1", "∂u₁/∂v₁", "line", 2),
+            Trace("gain_t2", "gain_q2", "∂u₁/∂q₂", "line", 3),
+            Trace("gain_t2", "gain_v2", "∂u₁/∂v₂", "line", 4),
         ),
         Curves(
             "Time of an iteration",
-            tuple(Trace("timed", phase, phase, "line", i + 1) for i, phase in enumerate(PHASES)),
             "iteration",
             "ms",
+            *tuple(Trace("timed", phase, phase, "line", i + 1) for i, phase in enumerate(PHASES)),
             log_y=True,
         ),
         TimeSeries(
             "Velocity",
             "rad/s; m/s",
-            (
-                Line("v", "v"),
-                Line("v_open", r"v^{\text{open}}", "dash"),
-                Line("v_bar", r"\bar v", "limit"),
-            ),
+            Line("v", "v"),
+            Line("v_open", r"v^{\text{open}}", "dash"),
+            Line("v_bar", r"\bar v", "limit"),
             select="joint",
         ),
         Readout("cost", "Cost J of the plan", ""),

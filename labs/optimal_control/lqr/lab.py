@@ -17,7 +17,7 @@ from labs.optimal_control.lqr.regulator import (
     regulator,
     settled,
 )
-from labs.params import Params, Value, choice, knob, toggle
+from labs.params import Group, Params, Value
 from labs.plots import Curves, Line, Matrix, Readout, TimeSeries, Trace
 from labs.problems.linear_quadratic import LqrProblem
 from labs.scene import Scene
@@ -38,171 +38,56 @@ LONGEST = 0.6
 ADVICE = "The policy knows of no limits: start closer, push less, or weigh otherwise; then reset."
 
 
+SYSTEM = Group("System", effect="restart")
+WEIGHTS = Group("Weights", effect="solve")
+HORIZON = Group("Horizon", effect="solve")
+WORLD = Group("World", effect="solve")
+
+
 class LqrParams(Params):
     """What the user can turn."""
 
-    system: str = choice(
-        "cart-pole",
-        SYSTEMS,
-        label="System",
-        group="System",
-        effect="restart",
-        help="What is to be kept at rest.",
+    system: str = SYSTEM.choice("cart-pole", SYSTEMS, "System")
+    """What is to be kept at rest."""
+    deviation: float = SYSTEM.knob(
+        0.3, -3.2, 3.2, "\\Delta x_0", "rad, m", "Start off by", step=0.01
     )
-    deviation: float = knob(
-        0.3,
-        -3.2,
-        3.2,
-        symbol="\\Delta x_0",
-        unit="rad, m",
-        label="Start off by",
-        group="System",
-        step=0.01,
-        effect="restart",
-        help="Of the pole, the pendulum, the mass, or every joint of the UR5, at rest.",
+    """Of the pole, the pendulum, the mass, or every joint of the UR5, at rest."""
+    period: float = SYSTEM.choice(0.02, PERIODS, "Time step", "T", "s", effect="solve")
+    """From t to t + 1: the policy looks once in a step and holds its control."""
+    q_slide: float = WEIGHTS.knob(10.0, 0.0, 10_000.0, "q_p", "1/m²", "Position", scale="log")
+    """Q's weight of what slides: the cart, the mass."""
+    q_turn: float = WEIGHTS.knob(10.0, 0.0, 10_000.0, "q_\\theta", "1/rad²", "Angle", scale="log")
+    """Q's weight of what turns: the pole, the pendulum, each joint of the UR5."""
+    q_slide_rate: float = WEIGHTS.knob(
+        1.0, 0.0, 1000.0, "q_{\\dot p}", "s²/m²", "Velocity", scale="log"
     )
-    period: float = choice(
-        0.02,
-        PERIODS,
-        label="Time step",
-        symbol="T",
-        unit="s",
-        group="System",
-        effect="solve",
-        help="From t to t + 1: the policy looks once in a step and holds its control.",
+    """Q's weight of the velocity of what slides."""
+    q_turn_rate: float = WEIGHTS.knob(
+        1.0, 0.0, 1000.0, "q_{\\dot\\theta}", "s²/rad²", "Angular velocity", scale="log"
     )
-    q_slide: float = knob(
-        10.0,
-        0.0,
-        10_000.0,
-        symbol="q_p",
-        unit="1/m²",
-        label="Position",
-        group="Weights",
-        scale="log",
-        effect="solve",
-        help="Q's weight of what slides: the cart, the mass.",
+    """Q's weight of the velocity of what turns."""
+    r: float = WEIGHTS.knob(0.1, 1e-4, 1e4, "r", "1/N², 1/(N·m)²", "Control", scale="log")
+    """R = r I: what force or torque costs."""
+    policy: str = HORIZON.choice("steady", POLICIES, "Policy")
+    """The steady state's gain for ever, or those of N steps: all in turn and then over again, or
+    the first of them at every step."""
+    horizon: float = HORIZON.knob(100.0, 1.0, 300.0, "N", "", "Horizon", step=1.0)
+    """Steps over which the cost is summed up."""
+    final: str = HORIZON.choice("q", FINALS, "Final weight", "Q_f")
+    """What the final weight is a multiple of."""
+    alpha: float = HORIZON.knob(1.0, 0.0, 1000.0, "\\alpha", "", "Its scale", scale="log")
+    """How many times as much; with 0 it does not matter where x ends."""
+    limits: bool = WORLD.toggle(True, "Limits")
+    """Cut every control to what the motor can give. The regulator knows of none."""
+    limit: float = WORLD.knob(
+        20.0, 0.5, 200.0, "u_{max}", "N, N·m", "Strongest control", scale="log"
     )
-    q_turn: float = knob(
-        10.0,
-        0.0,
-        10_000.0,
-        symbol="q_\\theta",
-        unit="1/rad²",
-        label="Angle",
-        group="Weights",
-        scale="log",
-        effect="solve",
-        help="Q's weight of what turns: the pole, the pendulum, each joint of the UR5.",
+    """Of the cart, the pendulum and the mass; the UR5's joints have motors of their own."""
+    push_force: float = WORLD.knob(
+        1.0, 0.0, 200.0, "f_{push}", "N", "Push force", scale="log", effect="live"
     )
-    q_slide_rate: float = knob(
-        1.0,
-        0.0,
-        1000.0,
-        symbol="q_{\\dot p}",
-        unit="s²/m²",
-        label="Velocity",
-        group="Weights",
-        scale="log",
-        effect="solve",
-        help="Q's weight of the velocity of what slides.",
-    )
-    q_turn_rate: float = knob(
-        1.0,
-        0.0,
-        1000.0,
-        symbol="q_{\\dot\\theta}",
-        unit="s²/rad²",
-        label="Angular velocity",
-        group="Weights",
-        scale="log",
-        effect="solve",
-        help="Q's weight of the velocity of what turns.",
-    )
-    r: float = knob(
-        0.1,
-        1e-4,
-        1e4,
-        symbol="r",
-        unit="1/N², 1/(N·m)²",
-        label="Control",
-        group="Weights",
-        scale="log",
-        effect="solve",
-        help="R = r I: what force or torque costs.",
-    )
-    policy: str = choice(
-        "steady",
-        POLICIES,
-        label="Policy",
-        group="Horizon",
-        effect="solve",
-        help="The steady state's gain for ever, or those of N steps: all in turn and then over "
-        "again, or the first of them at every step.",
-    )
-    horizon: float = knob(
-        100.0,
-        1.0,
-        300.0,
-        symbol="N",
-        unit="",
-        label="Horizon",
-        group="Horizon",
-        step=1.0,
-        effect="solve",
-        help="Steps over which the cost is summed up.",
-    )
-    final: str = choice(
-        "q",
-        FINALS,
-        label="Final weight",
-        symbol="Q_f",
-        group="Horizon",
-        effect="solve",
-        help="What the final weight is a multiple of.",
-    )
-    alpha: float = knob(
-        1.0,
-        0.0,
-        1000.0,
-        symbol="\\alpha",
-        unit="",
-        label="Its scale",
-        group="Horizon",
-        scale="log",
-        effect="solve",
-        help="How many times as much; with 0 it does not matter where x ends.",
-    )
-    limits: bool = toggle(
-        True,
-        label="Limits",
-        group="World",
-        effect="solve",
-        help="Cut every control to what the motor can give. The regulator knows of none.",
-    )
-    limit: float = knob(
-        20.0,
-        0.5,
-        200.0,
-        symbol="u_{max}",
-        unit="N, N·m",
-        label="Strongest control",
-        group="World",
-        scale="log",
-        effect="solve",
-        help="Of the cart, the pendulum and the mass; the UR5's joints have motors of their own.",
-    )
-    push_force: float = knob(
-        1.0,
-        0.0,
-        200.0,
-        symbol="f_{push}",
-        unit="N",
-        label="Push force",
-        group="World",
-        scale="log",
-        help="On the tip, along +y, while a push lasts, 0.2 s.",
-    )
+    """On the tip, along +y, while a push lasts, 0.2 s."""
 
     @property
     def linear_system(self) -> LinearSystem:
@@ -295,77 +180,69 @@ class Lqr(Lab[LqrParams, LqrState]):
     Params = LqrParams
     period = STEP
     plots = (
-        TimeSeries("Deviation", "rad, m", (Line("dq", "q - q_{eq}"),), select="coordinate"),
+        TimeSeries("Deviation", "rad, m", Line("dq", "q - q_{eq}"), select="coordinate"),
         TimeSeries(
             "Control",
             "N, N·m",
-            (
-                Line("u", "u"),
-                Line("u_max", "u_{max}", "limit"),
-                Line("u_min", "-u_{max}", "limit"),
-            ),
+            Line("u", "u"),
+            Line("u_max", "u_{max}", "limit"),
+            Line("u_min", "-u_{max}", "limit"),
             select="motor",
         ),
         Curves(
             "Where the policy recovers",
-            (
-                Trace("safe_x", "safe_y", "comes back", "points", 3),
-                Trace("path_x", "path_y", "so far", "line", 1),
-                Trace("now_x", "now_y", "now", "points", 2),
-            ),
             "lean from the rest [rad] (mass: place [m])",
             "its rate [rad/s] (mass: [m/s])",
+            Trace("safe_x", "safe_y", "comes back", "points", 3),
+            Trace("path_x", "path_y", "so far", "line", 1),
+            Trace("now_x", "now_y", "now", "points", 2),
         ),
         TimeSeries(
             "Cost",
             "",
-            (
-                Line("paid", r"\text{so far}"),
-                Line("total", r"\text{so far} + V_t(x_t)"),
-                Line("predicted", r"x_0^T P_0\, x_0", "limit"),
-            ),
+            Line("paid", r"\text{so far}"),
+            Line("total", r"\text{so far} + V_t(x_t)"),
+            Line("predicted", r"x_0^T P_0\, x_0", "limit"),
         ),
         Curves(
             "Value, backward from N",
-            (*_elements("p"), Trace("p_mark", "p_span", "constant before", "dash", 0)),
             "t [steps]",
             "Pₜ,ᵢᵢ / steady",
+            *_elements("p"),
+            Trace("p_mark", "p_span", "constant before", "dash", 0),
             log_y=True,
         ),
         Curves(
             "Gain, backward from N",
-            (*_elements("k"), Trace("k_mark", "k_span", "constant before", "dash", 0)),
             "t [steps]",
             "Kₜ,₁ᵢ / steady (UR5: Kₜ,ᵢᵢ)",
+            *_elements("k"),
+            Trace("k_mark", "k_span", "constant before", "dash", 0),
         ),
         Curves(
             "Eigenvalues of one step",
-            (
-                Trace("open_re", "open_im", "A", "points", 7),
-                Trace("closed_re", "closed_im", "A + B K", "points", 1),
-            ),
             "Re",
             "Im",
+            Trace("open_re", "open_im", "A", "points", 7),
+            Trace("closed_re", "closed_im", "A + B K", "points", 1),
             guide="unit-circle",
             equal=True,
         ),
-        TimeSeries("Velocity", "rad/s, m/s", (Line("v", r"\dot q"),), select="coordinate"),
+        TimeSeries("Velocity", "rad/s, m/s", Line("v", r"\dot q"), select="coordinate"),
         Curves(
             "Time to solve",
-            (
-                Trace("horizons", "riccati", "Riccati, slope", "marked", 1, "riccati_slope"),
-                Trace("horizons", "at_once", "least squares, slope", "marked", 2, "at_once_slope"),
-            ),
             "N",
             "seconds",
+            Trace("horizons", "riccati", "Riccati, slope", "marked", 1, "riccati_slope"),
+            Trace("horizons", "at_once", "least squares, slope", "marked", 2, "at_once_slope"),
             log_x=True,
             log_y=True,
         ),
         Curves(
             "Difference of the two solutions",
-            (Trace("horizons", "difference", "share of the largest control", "marked", 4),),
             "N",
             "difference",
+            Trace("horizons", "difference", "share of the largest control", "marked", 4),
             log_x=True,
             log_y=True,
         ),

@@ -23,7 +23,7 @@ from labs.optimal_control.lqr_tracking.laps import (
     tracked,
 )
 from labs.optimal_control.lqr_tracking.tracking import CHOSEN, Setting, View, known, lap_of, view
-from labs.params import Knob, Params, Value, choice, knob, toggle
+from labs.params import Group, Knob, Params, Value
 from labs.plots import Curves, Line, Matrix, Readout, TimeSeries, Trace
 from labs.scene import Scene
 
@@ -50,177 +50,57 @@ CAMERAS = {
 }
 
 
+REFERENCE = Group("Reference")
+POLICY = Group("Policy")
+LINEAR_COSTS = Group("Linear costs")
+WORLD = Group("World")
+
+
 class TrackingParams(Params):
     """What the user can turn."""
 
-    robot: str = choice(
-        "ur5",
-        {"ur5": "UR5", "cart-pole": "Cart-pole"},
-        label="Robot",
-        group="Reference",
-        effect="restart",
-        help="An arm with six motors, or a pole kept upright on a cart with one.",
+    robot: str = REFERENCE.choice(
+        "ur5", {"ur5": "UR5", "cart-pole": "Cart-pole"}, "Robot", effect="restart"
     )
-    path: str = choice(
-        "circle",
-        {"circle": "Circle", "square": "Square"},
-        label="Path",
-        group="Reference",
-        help="Of the end-effector. The cart follows the circle's shadow, or jumps to and fro.",
+    """An arm with six motors, or a pole kept upright on a cart with one."""
+    path: str = REFERENCE.choice("circle", {"circle": "Circle", "square": "Square"}, "Path")
+    """Of the end-effector. The cart follows the circle's shadow, or jumps to and fro."""
+    radius: float = REFERENCE.knob(0.15, 0.0, 0.2, "A", "m", "Radius", step=0.005)
+    """Of the UR5's circle, or of the one round its square. Drag the ball on it, too."""
+    stroke: float = REFERENCE.knob(0.4, 0.0, 0.7, "A_p", "m", "Stroke", step=0.01)
+    """How far the cart's reference goes to either side. Drag the ball, too."""
+    plane: str = REFERENCE.choice(
+        "frontal", {"frontal": "Frontal", "horizontal": "Horizontal", "side": "Side"}, "Plane"
     )
-    radius: float = knob(
-        0.15,
-        0.0,
-        0.2,
-        symbol="A",
-        unit="m",
-        label="Radius",
-        group="Reference",
-        step=0.005,
-        help="Of the UR5's circle, or of the one round its square. Drag the ball on it, too.",
+    """Of the UR5's path."""
+    lap_time: float = REFERENCE.knob(3.0, 1.0, LONGEST_LAP, "T", "s", "Period", step=0.1)
+    """Of one lap. A change keeps the phase."""
+    feed_forward: str = REFERENCE.choice("none", FEED_FORWARDS, "Feed-forward", "u^{ref}")
+    """What the reference control holds. What it lacks is left to the feedback and to k."""
+    preview: float = POLICY.knob(60.0, 0.0, 100.0, "N", "steps", "Preview", step=1.0)
+    """Steps of 20 ms that the policy sees ahead. With none it is the ghost's."""
+    position_weight: float = POLICY.knob(
+        100.0, 1.0, 1e4, "Q_q", "1/rad², 1/m²", "Position weight", scale="log"
     )
-    stroke: float = knob(
-        0.4,
-        0.0,
-        0.7,
-        symbol="A_p",
-        unit="m",
-        label="Stroke",
-        group="Reference",
-        step=0.01,
-        help="How far the cart's reference goes to either side. Drag the ball, too.",
+    """Cost of a squared error of position, the same for all joints."""
+    velocity_weight: float = POLICY.knob(
+        1.0, 0.01, 100.0, "Q_v", "s²/rad², s²/m²", "Velocity weight", scale="log"
     )
-    plane: str = choice(
-        "frontal",
-        {"frontal": "Frontal", "horizontal": "Horizontal", "side": "Side"},
-        label="Plane",
-        group="Reference",
-        help="Of the UR5's path.",
-    )
-    lap_time: float = knob(
-        3.0,
-        1.0,
-        LONGEST_LAP,
-        symbol="T",
-        unit="s",
-        label="Period",
-        group="Reference",
-        step=0.1,
-        help="Of one lap. A change keeps the phase.",
-    )
-    feed_forward: str = choice(
-        "none",
-        FEED_FORWARDS,
-        label="Feed-forward",
-        symbol="u^{ref}",
-        group="Reference",
-        help="What the reference control holds. What it lacks is left to the feedback and to k.",
-    )
-    preview: float = knob(
-        60.0,
-        0.0,
-        100.0,
-        symbol="N",
-        unit="steps",
-        label="Preview",
-        group="Policy",
-        step=1.0,
-        help="Steps of 20 ms that the policy sees ahead. With none it is the ghost's.",
-    )
-    position_weight: float = knob(
-        100.0,
-        1.0,
-        1e4,
-        symbol="Q_q",
-        unit="1/rad², 1/m²",
-        label="Position weight",
-        group="Policy",
-        scale="log",
-        help="Cost of a squared error of position, the same for all joints.",
-    )
-    velocity_weight: float = knob(
-        1.0,
-        0.01,
-        100.0,
-        symbol="Q_v",
-        unit="s²/rad², s²/m²",
-        label="Velocity weight",
-        group="Policy",
-        scale="log",
-        help="Cost of a squared error of velocity, the same for all joints.",
-    )
-    effort_weight: float = knob(
-        20.0,
-        0.1,
-        1e4,
-        symbol="R",
-        unit="",
-        label="Effort weight",
-        group="Policy",
-        scale="log",
-        help="Cost of a control that differs from the reference control by the motor's limit.",
-    )
-    lean: float = knob(
-        0.0,
-        -20.0,
-        20.0,
-        symbol="q",
-        unit="1/rad, 1/m",
-        label="Lean",
-        group="Linear costs",
-        step=0.1,
-        help="Linear cost of the place of the shoulder, or of the cart: positive pushes it back.",
-    )
-    price: float = knob(
-        0.0,
-        -20.0,
-        20.0,
-        symbol="s",
-        unit="",
-        label="Price",
-        group="Linear costs",
-        step=0.1,
-        help="Linear cost of the effort at the shoulder, or the cart: positive favours negative.",
-    )
-    wind: float = knob(
-        0.0,
-        -20.0,
-        20.0,
-        symbol="f_y",
-        unit="N",
-        label="Wind",
-        group="World",
-        step=0.5,
-        help="A steady force on the end-effector, or on the cart, along the world's y axis.",
-    )
-    wind_known: bool = toggle(
-        True,
-        label="Wind known",
-        group="World",
-        help="Whether the policy's model has the wind, as part of the defect c.",
-    )
-    payload: float = knob(
-        0.0,
-        0.0,
-        2.0,
-        symbol="m_{load}",
-        unit="kg",
-        label="Payload",
-        group="World",
-        step=0.05,
-        help="A point mass at the tip that no policy knows of.",
-    )
-    push_force: float = knob(
-        20.0,
-        -60.0,
-        60.0,
-        symbol="f_{push}",
-        unit="N",
-        label="Push force",
-        group="World",
-        step=1.0,
-        help="Of a push: along the y axis like the wind, for 0.2 s, known to nobody.",
-    )
+    """Cost of a squared error of velocity, the same for all joints."""
+    effort_weight: float = POLICY.knob(20.0, 0.1, 1e4, "R", "", "Effort weight", scale="log")
+    """Cost of a control that differs from the reference control by the motor's limit."""
+    lean: float = LINEAR_COSTS.knob(0.0, -20.0, 20.0, "q", "1/rad, 1/m", "Lean", step=0.1)
+    """Linear cost of the place of the shoulder, or of the cart: positive pushes it back."""
+    price: float = LINEAR_COSTS.knob(0.0, -20.0, 20.0, "s", "", "Price", step=0.1)
+    """Linear cost of the effort at the shoulder, or the cart: positive favours negative."""
+    wind: float = WORLD.knob(0.0, -20.0, 20.0, "f_y", "N", "Wind", step=0.5)
+    """A steady force on the end-effector, or on the cart, along the world's y axis."""
+    wind_known: bool = WORLD.toggle(True, "Wind known")
+    """Whether the policy's model has the wind, as part of the defect c."""
+    payload: float = WORLD.knob(0.0, 0.0, 2.0, "m_{load}", "kg", "Payload", step=0.05)
+    """A point mass at the tip that no policy knows of."""
+    push_force: float = WORLD.knob(20.0, -60.0, 60.0, "f_{push}", "N", "Push force", step=1.0)
+    """Of a push: along the y axis like the wind, for 0.2 s, known to nobody."""
 
     @property
     def samples(self) -> int:
@@ -277,57 +157,51 @@ class LqrTracking(Lab[TrackingParams, TrackingState]):
     Params = TrackingParams
     period = H
     plots = (
-        TimeSeries("Tracking error", "m", (Line("error", "e"), Line("ghost_error", "e^{ghost}"))),
+        TimeSeries("Tracking error", "m", Line("error", "e"), Line("ghost_error", "e^{ghost}")),
         TimeSeries(
             "Position",
             "m",
-            (
-                Line("p", "p"),
-                Line("p_ghost", "p^{ghost}"),
-                Line("p_ref", "p^{ref}", "dash"),
-            ),
+            Line("p", "p"),
+            Line("p_ghost", "p^{ghost}"),
+            Line("p_ref", "p^{ref}", "dash"),
         ),
         TimeSeries(
             "Control",
             "N·m, N",
-            (
-                Line("u", "u", "dash"),
-                Line("feedback", r"K_t (x - x^{ref})"),
-                Line("u_ref", "u^{ref}"),
-                Line("affine", "k_t"),
-            ),
+            Line("u", "u", "dash"),
+            Line("feedback", r"K_t (x - x^{ref})"),
+            Line("u_ref", "u^{ref}"),
+            Line("affine", "k_t"),
             select="motor",
         ),
         TimeSeries(
-            "Joints", "rad, m", (Line("q", "q"), Line("q_ref", "q^{ref}", "dash")), select="joint"
+            "Joints", "rad, m", Line("q", "q"), Line("q_ref", "q^{ref}", "dash"), select="joint"
         ),
         TimeSeries(
             "Cost of a lap",
             "",
-            (
-                Line("lap_cost", "J"),
-                Line("ghost_lap_cost", "J^{ghost}"),
-                Line("optimum", "J^*", "dash"),
-            ),
+            Line("lap_cost", "J"),
+            Line("ghost_lap_cost", "J^{ghost}"),
+            Line("optimum", "J^*", "dash"),
         ),
         Curves(
             "Affine term over the preview",
-            tuple(
+            "time ahead [s]",
+            "k [N·m, N]",
+            *tuple(
                 Trace("ahead", f"k_{i}", f"k, motor {i}", series=i)
                 for i in range(1, MOST_MOTORS + 1)
             ),
-            "time ahead [s]",
-            "k [N·m, N]",
         ),
         Curves(
             "Gains over the preview",
-            tuple(
+            "time ahead [s]",
+            "K of the shoulder, or the cart",
+            *tuple(
                 Trace("ahead", f"K_{kind}{i}", f"by {kind}{i}", style, series=i)
                 for kind, style in GAINS
                 for i in range(1, MOST_MOTORS + 1)
             ),
-            "time ahead [s]",
-            "K of the shoulder, or the cart",
         ),
         Matrix("Gain now, by position", "K_position", "K_t", shade=True),
         Matrix("Gain now, by velocity", "K_velocity", "K_t", shade=True),

@@ -19,7 +19,7 @@ from labs.algorithms.inverse_kinematics import (
 from labs.algorithms.jacobian import Chain, Kinematics, analytical, geometric, geometric_rate
 from labs.lab import Inputs, Lab, Measurement, State
 from labs.models.arms import Arm, load
-from labs.params import Params, Value, choice, knob
+from labs.params import Group, Params, Value
 from labs.plots import Bars, Line, Matrix, Readout, TimeSeries
 from labs.scene import Scene
 
@@ -55,15 +55,21 @@ ELLIPSOIDS = {"velocity": "Velocity", "force": "Force", "both": "Both", "none": 
 COLUMNS = {"all": "All", "none": "None"} | {str(i): f"Joint {i}, lever" for i in range(1, 8)}
 
 
+POSTURE = Group("Posture")
+JOINT_VELOCITIES = Group("Joint velocities")
+ROBOT = Group("Robot", effect="restart")
+SHOW = Group("Show")
+INVERSE_KINEMATICS = Group("Inverse kinematics")
+
+
 def _angle(i: int) -> Any:
-    return knob(
+    return POSTURE.knob(
         0.0,
         -3.14,
         3.14,
-        symbol=f"q_{i} - q_{i}^{{home}}",
-        unit="rad",
-        label=f"Joint {i}",
-        group="Posture",
+        f"q_{i} - q_{i}^{{home}}",
+        "rad",
+        f"Joint {i}",
         step=0.01,
         help="Angle from the home posture, cut at the joint's limits. Ignored where the robot "
         "has no such joint, and by the sliding joint of the SCARA, which has a slider of its own.",
@@ -71,14 +77,13 @@ def _angle(i: int) -> Any:
 
 
 def _rate(i: int, value: float = 0.0) -> Any:
-    return knob(
+    return JOINT_VELOCITIES.knob(
         value,
         -2.0,
         2.0,
-        symbol=f"\\dot q_{i}",
-        unit="rad/s",
-        label=f"Speed {i}",
-        group="Joint velocities",
+        f"\\dot q_{i}",
+        "rad/s",
+        f"Speed {i}",
         step=0.01,
         help="Velocity of the joint; m/s where it slides. Ignored where the robot has no such "
         "joint, and while a target is followed.",
@@ -88,24 +93,12 @@ def _rate(i: int, value: float = 0.0) -> Any:
 class DifferentialParams(Params):
     """What the user can turn."""
 
-    robot: str = choice(
-        "ur5", ROBOTS, label="Robot", group="Robot", effect="restart", help="The arm."
-    )
-    frame: str = choice(
-        "end-effector",
-        FRAMES,
-        label="Frame",
-        group="Robot",
-        effect="restart",
-        help="Whose velocity the Jacobian gives; the last one where the robot has no such joint.",
-    )
-    mode: str = choice(
-        "posture",
-        MODES,
-        label="Motion",
-        group="Robot",
-        help="Stand as posed, move at the joint velocities below, or follow the target.",
-    )
+    robot: str = ROBOT.choice("ur5", ROBOTS, "Robot")
+    """The arm."""
+    frame: str = ROBOT.choice("end-effector", FRAMES, "Frame")
+    """Whose velocity the Jacobian gives; the last one where the robot has no such joint."""
+    mode: str = ROBOT.choice("posture", MODES, "Motion", effect="live")
+    """Stand as posed, move at the joint velocities below, or follow the target."""
     q1: float = _angle(1)
     q2: float = _angle(2)
     q3: float = _angle(3)
@@ -113,17 +106,8 @@ class DifferentialParams(Params):
     q5: float = _angle(5)
     q6: float = _angle(6)
     q7: float = _angle(7)
-    lift: float = knob(
-        0.0,
-        -0.15,
-        0.15,
-        symbol="d",
-        unit="m",
-        label="Slide",
-        group="Posture",
-        step=0.001,
-        help="The sliding joint of the SCARA; ignored by the other robots.",
-    )
+    lift: float = POSTURE.knob(0.0, -0.15, 0.15, "d", "m", "Slide", step=0.001)
+    """The sliding joint of the SCARA; ignored by the other robots."""
     dq1: float = _rate(1, 0.5)
     dq2: float = _rate(2)
     dq3: float = _rate(3)
@@ -131,82 +115,28 @@ class DifferentialParams(Params):
     dq5: float = _rate(5)
     dq6: float = _rate(6)
     dq7: float = _rate(7)
-    columns: str = choice(
-        "all",
-        COLUMNS,
-        label="Columns",
-        group="Show",
-        help="The Jacobian's columns as arrows: axes z in grey, columns of its linear rows in "
-        "blue.",
+    columns: str = SHOW.choice("all", COLUMNS, "Columns")
+    """The Jacobian's columns as arrows: axes z in grey, columns of its linear rows in blue."""
+    ellipsoid: str = SHOW.choice("velocity", ELLIPSOIDS, "Ellipsoid")
+    """All velocities for joint velocities of length 1, or all forces for joint torques of length
+    1."""
+    task: str = INVERSE_KINEMATICS.choice("position", TASKS, "Task", effect="restart")
+    """What must follow the target, the position alone or the orientation too; singular values are
+    those of its rows of J."""
+    method: str = INVERSE_KINEMATICS.choice("damped", METHODS, "Method")
+    """How the wanted velocity of the end-effector becomes joint velocities."""
+    damping: float = INVERSE_KINEMATICS.knob(
+        0.1, 0.001, 1.0, "\\lambda", "m", "Damping", scale="log"
     )
-    ellipsoid: str = choice(
-        "velocity",
-        ELLIPSOIDS,
-        label="Ellipsoid",
-        group="Show",
-        help="All velocities for joint velocities of length 1, or all forces for joint torques "
-        "of length 1.",
+    """Of damped least squares: below this a singular value counts as small."""
+    gain: float = INVERSE_KINEMATICS.knob(5.0, 0.0, 50.0, "k", "1/s", "Gain", scale="log")
+    """Velocity asked per error. The error's part is cut at 0.5 m/s and 1 rad/s."""
+    fastest: float = INVERSE_KINEMATICS.knob(
+        3.14, 0.5, 50.0, "\\dot q_{max}", "rad/s", "Speed limit", scale="log"
     )
-    task: str = choice(
-        "position",
-        TASKS,
-        label="Task",
-        group="Inverse kinematics",
-        effect="restart",
-        help="What must follow the target, the position alone or the orientation too; singular "
-        "values are those of its rows of J.",
-    )
-    method: str = choice(
-        "damped",
-        METHODS,
-        label="Method",
-        group="Inverse kinematics",
-        help="How the wanted velocity of the end-effector becomes joint velocities.",
-    )
-    damping: float = knob(
-        0.1,
-        0.001,
-        1.0,
-        symbol="\\lambda",
-        unit="m",
-        label="Damping",
-        group="Inverse kinematics",
-        scale="log",
-        help="Of damped least squares: below this a singular value counts as small.",
-    )
-    gain: float = knob(
-        5.0,
-        0.0,
-        50.0,
-        symbol="k",
-        unit="1/s",
-        label="Gain",
-        group="Inverse kinematics",
-        scale="log",
-        help="Velocity asked per error. The error's part is cut at 0.5 m/s and 1 rad/s.",
-    )
-    fastest: float = knob(
-        3.14,
-        0.5,
-        50.0,
-        symbol="\\dot q_{max}",
-        unit="rad/s",
-        label="Speed limit",
-        group="Inverse kinematics",
-        scale="log",
-        help="What a motor gives (m/s where it slides). All joints slow down by one factor.",
-    )
-    reach: float = knob(
-        0.0,
-        0.0,
-        0.8,
-        symbol="A",
-        unit="m",
-        label="Reach out",
-        group="Inverse kinematics",
-        step=0.01,
-        help="The target moves this far away from the base axis and back, in 8 s.",
-    )
+    """What a motor gives (m/s where it slides). All joints slow down by one factor."""
+    reach: float = INVERSE_KINEMATICS.knob(0.0, 0.0, 0.8, "A", "m", "Reach out", step=0.01)
+    """The target moves this far away from the base axis and back, in 8 s."""
 
     @property
     def arm(self) -> Arm:
@@ -279,23 +209,23 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         TimeSeries(
             "Distance to singularity",
             "",
-            (Line("sigma_min", r"\sigma_{min}"), Line("near", r"\text{warning}", "limit")),
+            Line("sigma_min", r"\sigma_{min}"),
+            Line("near", r"\text{warning}", "limit"),
         ),
         TimeSeries(
             "Joint speed",
             "rad/s",
-            (
-                Line("speed", r"\lVert\dot q\rVert"),
-                Line("speed_given", r"\lVert\dot q\rVert_{given}", "dash"),
-                Line("bound", r"\lVert v\rVert/(2\lambda)", "limit"),
-            ),
+            Line("speed", r"\lVert\dot q\rVert"),
+            Line("speed_given", r"\lVert\dot q\rVert_{given}", "dash"),
+            Line("bound", r"\lVert v\rVert/(2\lambda)", "limit"),
         ),
-        TimeSeries("Joint velocities", "rad/s", (Line("rates", r"\dot q"),), select="joint"),
-        TimeSeries("Task error", "m", (Line("error", r"\lVert p^* - p_e\rVert"),)),
+        TimeSeries("Joint velocities", "rad/s", Line("rates", r"\dot q"), select="joint"),
+        TimeSeries("Task error", "m", Line("error", r"\lVert p^* - p_e\rVert")),
         TimeSeries(
             "Speed of orientation",
             "rad/s",
-            (Line("omega", r"\lVert\omega\rVert"), Line("rpy", r"\lVert\dot\phi_o\rVert", "dash")),
+            Line("omega", r"\lVert\omega\rVert"),
+            Line("rpy", r"\lVert\dot\phi_o\rVert", "dash"),
         ),
         Readout("sigma_min", "Distance to singularity (warning below 0.05)", ""),
         Readout("manipulability", "Manipulability", ""),

@@ -16,7 +16,7 @@ from labs.lab import Inputs, Lab, Measurement, State
 from labs.models.arms import load
 from labs.models.plant import Plant, plant
 from labs.models.postures import POSTURES, ROBOTS, posture
-from labs.params import Params, Value, choice, knob, toggle
+from labs.params import Group, Params, Value
 from labs.plots import Bars, Line, Matrix, Readout, TimeSeries
 from labs.scene import Scene
 
@@ -41,29 +41,35 @@ DRIVES = {
 STEPS = {0.0005: "0.5 ms", 0.001: "1 ms", 0.002: "2 ms", 0.005: "5 ms", 0.01: "10 ms"}
 
 
+TORQUES = Group("Torques")
+ACCELERATIONS_ASKED_FOR = Group("Accelerations asked for")
+START = Group("Start", effect="restart")
+EXTERNAL_FORCE = Group("External force")
+ROBOT = Group("Robot")
+SIMULATION = Group("Simulation")
+
+
 def _torque(joint: int) -> Any:
-    return knob(
+    return TORQUES.knob(
         0.0,
         -30.0,
         30.0,
-        symbol=f"\\tau_{joint}",
-        unit="N·m",
-        label=f"Joint {joint}",
-        group="Torques",
+        f"\\tau_{joint}",
+        "N·m",
+        f"Joint {joint}",
         step=0.1,
         help="Added to what drives the joints. Without effect where there is no such joint.",
     )
 
 
 def _acceleration(joint: int, default: float = 0.0) -> Any:
-    return knob(
+    return ACCELERATIONS_ASKED_FOR.knob(
         default,
         -10.0,
         10.0,
-        symbol=f"a_{joint}",
-        unit="rad/s²",
-        label=f"Joint {joint}",
-        group="Accelerations asked for",
+        f"a_{joint}",
+        "rad/s²",
+        f"Joint {joint}",
         step=0.1,
         help="Inverse dynamics finds the torque for it. Without effect where there is no such "
         "joint.",
@@ -71,30 +77,27 @@ def _acceleration(joint: int, default: float = 0.0) -> Any:
 
 
 def _turn(joint: int) -> Any:
-    return knob(
+    return START.knob(
         0.0,
         -3.14,
         3.14,
-        symbol=f"\\Delta q_{joint}",
-        unit="rad",
-        label=f"Joint {joint}",
-        group="Start",
+        f"\\Delta q_{joint}",
+        "rad",
+        f"Joint {joint}",
         step=0.01,
-        effect="restart",
         help="Turns this joint away from the posture chosen. Without effect where the robot has "
         "no such joint.",
     )
 
 
 def _force(axis: str) -> Any:
-    return knob(
+    return EXTERNAL_FORCE.knob(
         0.0,
         -100.0,
         100.0,
-        symbol=f"f_{axis}",
-        unit="N",
-        label=f"Force {axis}",
-        group="External force",
+        f"f_{axis}",
+        "N",
+        f"Force {axis}",
         step=1.0,
         help="On the end-effector, in the world's axes: a wrench w without a moment.",
     )
@@ -103,34 +106,17 @@ def _force(axis: str) -> Any:
 class DynamicsParams(Params):
     """What the user can turn."""
 
-    robot: str = choice(
-        "ur5",
-        {name: load(name).title for name in ROBOTS},
-        label="Robot",
-        group="Robot",
-        effect="restart",
-        help="The arm that moves.",
+    robot: str = ROBOT.choice(
+        "ur5", {name: load(name).title for name in ROBOTS}, "Robot", effect="restart"
     )
-    payload: float = knob(
-        0.0,
-        0.0,
-        10.0,
-        symbol="m_{load}",
-        unit="kg",
-        label="Payload",
-        group="Robot",
-        step=0.1,
-        help="A point mass at the end-effector, known to all that is computed here.",
-    )
-    gravity: bool = toggle(True, label="Gravity", group="Robot", help="Off: g(q) = 0.")
-    drive: str = choice(
-        "inverse",
-        DRIVES,
-        label="Drive",
-        group="Torques",
-        help="What the motors do: carry the arm's weight g(q), what inverse dynamics says for the "
-        "accelerations asked for, or nothing. The sliders add to it.",
-    )
+    """The arm that moves."""
+    payload: float = ROBOT.knob(0.0, 0.0, 10.0, "m_{load}", "kg", "Payload", step=0.1)
+    """A point mass at the end-effector, known to all that is computed here."""
+    gravity: bool = ROBOT.toggle(True, "Gravity")
+    """Off: g(q) = 0."""
+    drive: str = TORQUES.choice("inverse", DRIVES, "Drive")
+    """What the motors do: carry the arm's weight g(q), what inverse dynamics says for the
+    accelerations asked for, or nothing. The sliders add to it."""
     tau1: float = _torque(1)
     tau2: float = _torque(2)
     tau3: float = _torque(3)
@@ -138,18 +124,9 @@ class DynamicsParams(Params):
     tau5: float = _torque(5)
     tau6: float = _torque(6)
     tau7: float = _torque(7)
-    damping: float = knob(
-        0.0,
-        0.0,
-        10.0,
-        symbol="b",
-        unit="N·m·s/rad",
-        label="Damping",
-        group="Torques",
-        step=0.1,
-        help="The motors brake with -b q' on top of all else: under a constant torque the joints "
-        "then reach a constant speed.",
-    )
+    damping: float = TORQUES.knob(0.0, 0.0, 10.0, "b", "N·m·s/rad", "Damping", step=0.1)
+    """The motors brake with -b q' on top of all else: under a constant torque the joints then reach
+    a constant speed."""
     a1: float = _acceleration(1, 1.5)
     a2: float = _acceleration(2, 2.0)
     a3: float = _acceleration(3, -3.0)
@@ -157,28 +134,13 @@ class DynamicsParams(Params):
     a5: float = _acceleration(5)
     a6: float = _acceleration(6)
     a7: float = _acceleration(7)
-    swing: float = knob(
-        2.0,
-        0.5,
-        10.0,
-        symbol="T_a",
-        unit="s",
-        label="Period",
-        group="Accelerations asked for",
-        step=0.1,
-        help="The accelerations come and go as a cos(2 pi t / T_a), so that the arm stays near.",
-    )
+    swing: float = ACCELERATIONS_ASKED_FOR.knob(2.0, 0.5, 10.0, "T_a", "s", "Period", step=0.1)
+    """The accelerations come and go as a cos(2 pi t / T_a), so that the arm stays near."""
     fx: float = _force("x")
     fy: float = _force("y")
     fz: float = _force("z")
-    posture: str = choice(
-        "home",
-        POSTURES,
-        label="Posture",
-        group="Start",
-        effect="restart",
-        help="Where the arm starts; the joint sliders turn it.",
-    )
+    posture: str = START.choice("home", POSTURES, "Posture")
+    """Where the arm starts; the joint sliders turn it."""
     q1: float = _turn(1)
     q2: float = _turn(2)
     q3: float = _turn(3)
@@ -186,34 +148,14 @@ class DynamicsParams(Params):
     q5: float = _turn(5)
     q6: float = _turn(6)
     q7: float = _turn(7)
-    speed: float = knob(
-        0.0,
-        -3.0,
-        3.0,
-        symbol="\\dot q(0)",
-        unit="rad/s",
-        label="Velocity",
-        group="Start",
-        step=0.05,
-        effect="restart",
-        help="How fast every joint turns at the start.",
+    speed: float = START.knob(0.0, -3.0, 3.0, "\\dot q(0)", "rad/s", "Velocity", step=0.05)
+    """How fast every joint turns at the start."""
+    integrator: str = SIMULATION.choice(
+        "rk4", {name: method.title for name, method in INTEGRATORS.items()}, "Integrator"
     )
-    integrator: str = choice(
-        "rk4",
-        {name: method.title for name, method in INTEGRATORS.items()},
-        label="Integrator",
-        group="Simulation",
-        help="The method that integrates the motion.",
-    )
-    step: float = choice(
-        0.001,
-        STEPS,
-        label="Integration step",
-        symbol="h",
-        unit="s",
-        group="Simulation",
-        help="Length of one step; the torque is held during it.",
-    )
+    """The method that integrates the motion."""
+    step: float = SIMULATION.choice(0.001, STEPS, "Integration step", "h", "s")
+    """Length of one step; the torque is held during it."""
 
     @property
     def start(self) -> np.ndarray:
@@ -281,12 +223,10 @@ class Dynamics(Lab[DynamicsParams, DynamicsState]):
         TimeSeries(
             "What the torque of a joint is spent on",
             "N·m",
-            (
-                Line("inertia", r"M \ddot q"),
-                Line("coriolis", r"C \dot q"),
-                Line("gravity", "g"),
-                Line("applied", r"\tau + J^T w", "dash"),
-            ),
+            Line("inertia", r"M \ddot q"),
+            Line("coriolis", r"C \dot q"),
+            Line("gravity", "g"),
+            Line("applied", r"\tau + J^T w", "dash"),
             select="joint",
             stacked=True,
             lead=1,
@@ -303,10 +243,10 @@ class Dynamics(Lab[DynamicsParams, DynamicsState]):
             limit="torque_limit",
         ),
         TimeSeries(
-            "Energy", "J", (Line("kinetic", "T"), Line("potential", "U"), Line("total", "T + U"))
+            "Energy", "J", Line("kinetic", "T"), Line("potential", "U"), Line("total", "T + U")
         ),
-        TimeSeries("Acceleration", "rad/s²", (Line("acceleration", r"\ddot q"),), select="joint"),
-        TimeSeries("Velocity", "rad/s", (Line("v", r"\dot q"),), select="joint"),
+        TimeSeries("Acceleration", "rad/s²", Line("acceleration", r"\ddot q"), select="joint"),
+        TimeSeries("Velocity", "rad/s", Line("v", r"\dot q"), select="joint"),
         Readout("there_and_back", "Inverse, then direct", "rad/s²"),
         Readout("back_and_there", "Direct, then inverse", "N·m"),
         Readout("residual", "Left − right side", "N·m"),

@@ -13,8 +13,8 @@ from labs.algorithms.joint_control import LAWS, Gains, Law
 from labs.lab import Action, Inputs, Lab, Measurement, State
 from labs.models.arms import load
 from labs.models.plant import Force, Plant, plant
-from labs.params import Params, Value, choice, knob, toggle
-from labs.plots import Curve, Line, Readout, TimeSeries
+from labs.params import Group, Params, Value
+from labs.plots import Curves, Line, Readout, TimeSeries, Trace
 from labs.reactive_control.joint_control.divergence import Menu, explain
 from labs.reactive_control.joint_control.references import cycles_per_second, motion
 from labs.reactive_control.joint_control.sampled_control import (
@@ -68,182 +68,61 @@ STEPS = {
 DIRECTIONS = {"x": "+x", "y": "+y", "z": "+z", "-x": "-x", "-y": "-y", "-z": "-z"}
 
 
+ROBOT = Group("Robot", effect="restart")
+REFERENCE = Group("Reference")
+CONTROLLER = Group("Controller")
+WORLD = Group("World")
+SIMULATION = Group("Simulation")
+PUSH = Group("Push")
+
+
 class JointParams(Params):
     """What the user can turn."""
 
-    robot: str = choice(
-        "ur5", ROBOTS, label="Robot", group="Robot", effect="restart", help="The arm to control."
+    robot: str = ROBOT.choice("ur5", ROBOTS, "Robot")
+    """The arm to control."""
+    reference: str = REFERENCE.choice("sinusoid", REFERENCES, "Reference")
+    """The motion every joint should make, around the robot's home posture."""
+    amplitude: float = REFERENCE.knob(0.3, 0.0, 0.8, "A", "rad", "Amplitude", step=0.01)
+    """How far every joint moves from home. Moving this slider moves q_ref at once."""
+    frequency: float = REFERENCE.knob(0.3, 0.05, 2.0, "f", "Hz", "Frequency", step=0.01)
+    """Of the sinusoid. A change keeps the phase, so the reference does not jump."""
+    duration: float = REFERENCE.knob(1.5, 0.3, 5.0, "D", "s", "Duration", step=0.05)
+    """Of one minimum-jerk move; a rest of half of it follows."""
+    initial_error: float = REFERENCE.knob(
+        0.0, -0.5, 0.5, "q(0) - q^{ref}(0)", "rad", "Initial error", effect="restart"
     )
-    reference: str = choice(
-        "sinusoid",
-        REFERENCES,
-        label="Reference",
-        group="Reference",
-        help="The motion every joint should make, around the robot's home posture.",
-    )
-    amplitude: float = knob(
-        0.3,
-        0.0,
-        0.8,
-        symbol="A",
-        unit="rad",
-        label="Amplitude",
-        group="Reference",
-        step=0.01,
-        help="How far every joint moves from home. Moving this slider moves q_ref at once.",
-    )
-    frequency: float = knob(
-        0.3,
-        0.05,
-        2.0,
-        symbol="f",
-        unit="Hz",
-        label="Frequency",
-        group="Reference",
-        step=0.01,
-        help="Of the sinusoid. A change keeps the phase, so the reference does not jump.",
-    )
-    duration: float = knob(
-        1.5,
-        0.3,
-        5.0,
-        symbol="D",
-        unit="s",
-        label="Duration",
-        group="Reference",
-        step=0.05,
-        help="Of one minimum-jerk move; a rest of half of it follows.",
-    )
-    initial_error: float = knob(
-        0.0,
-        -0.5,
-        0.5,
-        symbol="q(0) - q^{ref}(0)",
-        unit="rad",
-        label="Initial error",
-        group="Reference",
-        effect="restart",
-        help="How far every joint starts from where the reference starts.",
-    )
-    controller: str = choice(
-        "pd-gravity",
-        CONTROLLERS,
-        label="Controller",
-        group="Controller",
-        help="The law that turns the state and the reference into torques.",
-    )
-    kp: float = knob(
-        200.0,
-        0.0,
-        2000.0,
-        symbol="k_p",
-        unit="N·m/rad",
-        group="Controller",
-        scale="log",
-        help="Torque per error. In computed torque an acceleration per error, 1/s².",
-    )
-    ki: float = knob(
-        0.0,
-        0.0,
-        2000.0,
-        symbol="k_i",
-        unit="N·m/(rad·s)",
-        group="Controller",
-        scale="log",
-        help="Torque per integrated error, PID only. At zero the integral is emptied.",
-    )
-    kd: float = knob(
-        30.0,
-        0.0,
-        HIGHEST_KD,
-        symbol="k_d",
-        unit="N·m·s/rad",
-        group="Controller",
-        scale="log",
-        help="Torque per error of velocity. In computed torque 1/s.",
-    )
-    payload: float = knob(
-        0.0,
-        0.0,
-        10.0,
-        symbol="m_{load}",
-        unit="kg",
-        label="Payload",
-        group="World",
-        step=0.1,
-        help="A point mass at the end-effector that the controller does not know of.",
-    )
-    friction: float = knob(
-        0.0,
-        0.0,
-        20.0,
-        symbol="b",
-        unit="N·m·s/rad",
-        label="Friction",
-        group="World",
-        step=0.1,
-        help="Viscous friction at every joint that the controller does not know of.",
-    )
-    torque_limits: bool = toggle(
-        True,
-        label="Torque limits",
-        group="World",
-        help="Cut every torque to what the motor can give. The plot shows the limits either way.",
-    )
-    noise: float = knob(
-        0.0,
-        0.0,
-        0.02,
-        symbol="\\sigma",
-        unit="rad",
-        label="Sensor noise",
-        group="World",
-        scale="log",
-        help="Standard deviation of the measured angles; of the velocities it is 10/s times this.",
-    )
-    control_period: float = choice(
-        0.001,
-        PERIODS,
-        label="Control period",
-        symbol="T",
-        unit="s",
-        group="Simulation",
-        help="Time between two looks of the controller; rounded up to whole integration steps.",
-    )
-    integrator: str = choice(
+    """How far every joint starts from where the reference starts."""
+    controller: str = CONTROLLER.choice("pd-gravity", CONTROLLERS, "Controller")
+    """The law that turns the state and the reference into torques."""
+    kp: float = CONTROLLER.knob(200.0, 0.0, 2000.0, "k_p", "N·m/rad", scale="log")
+    """Torque per error. In computed torque an acceleration per error, 1/s²."""
+    ki: float = CONTROLLER.knob(0.0, 0.0, 2000.0, "k_i", "N·m/(rad·s)", scale="log")
+    """Torque per integrated error, PID only. At zero the integral is emptied."""
+    kd: float = CONTROLLER.knob(30.0, 0.0, HIGHEST_KD, "k_d", "N·m·s/rad", scale="log")
+    """Torque per error of velocity. In computed torque 1/s."""
+    payload: float = WORLD.knob(0.0, 0.0, 10.0, "m_{load}", "kg", "Payload", step=0.1)
+    """A point mass at the end-effector that the controller does not know of."""
+    friction: float = WORLD.knob(0.0, 0.0, 20.0, "b", "N·m·s/rad", "Friction", step=0.1)
+    """Viscous friction at every joint that the controller does not know of."""
+    torque_limits: bool = WORLD.toggle(True, "Torque limits")
+    """Cut every torque to what the motor can give. The plot shows the limits either way."""
+    noise: float = WORLD.knob(0.0, 0.0, 0.02, "\\sigma", "rad", "Sensor noise", scale="log")
+    """Standard deviation of the measured angles; of the velocities it is 10/s times this."""
+    control_period: float = SIMULATION.choice(0.001, PERIODS, "Control period", "T", "s")
+    """Time between two looks of the controller; rounded up to whole integration steps."""
+    integrator: str = SIMULATION.choice(
         "semi-implicit-euler",
         {name: method.title for name, method in INTEGRATORS.items()},
-        label="Integrator",
-        group="Simulation",
-        help="The method that integrates the robot's motion.",
+        "Integrator",
     )
-    step: float = choice(
-        0.001,
-        STEPS,
-        label="Integration step",
-        symbol="h",
-        unit="s",
-        group="Simulation",
-        help="Length of one step of the integrator.",
-    )
-    push_force: float = knob(
-        80.0,
-        0.0,
-        200.0,
-        symbol="f_{push}",
-        unit="N",
-        label="Push force",
-        group="Push",
-        step=1.0,
-        help="Force on the end-effector while a push lasts, 0.2 s.",
-    )
-    push_direction: str = choice(
-        "-y",
-        DIRECTIONS,
-        label="Push direction",
-        group="Push",
-        help="Along which axis of the world to push.",
-    )
+    """The method that integrates the robot's motion."""
+    step: float = SIMULATION.choice(0.001, STEPS, "Integration step", "h", "s")
+    """Length of one step of the integrator."""
+    push_force: float = PUSH.knob(80.0, 0.0, 200.0, "f_{push}", "N", "Push force", step=1.0)
+    """Force on the end-effector while a push lasts, 0.2 s."""
+    push_direction: str = PUSH.choice("-y", DIRECTIONS, "Push direction")
+    """Along which axis of the world to push."""
 
     @property
     def gains(self) -> Gains:
@@ -316,38 +195,32 @@ class JointControl(Lab[JointParams, JointState]):
     period = 0.01
     plots = (
         TimeSeries(
-            "Position", "rad", (Line("q", "q"), Line("q_ref", "q^{ref}", "dash")), select="joint"
+            "Position", "rad", Line("q", "q"), Line("q_ref", "q^{ref}", "dash"), select="joint"
         ),
-        TimeSeries("Error", "rad", (Line("error", "e = q^{ref} - q"),), select="joint"),
+        TimeSeries("Error", "rad", Line("error", "e = q^{ref} - q"), select="joint"),
         TimeSeries(
             "Torque",
             "N·m",
-            (
-                Line("torque", r"\tau"),
-                Line("torque_limit", r"\tau_{max}", "limit"),
-                Line("torque_floor", r"-\tau_{max}", "limit"),
-            ),
+            Line("torque", r"\tau"),
+            Line("torque_limit", r"\tau_{max}", "limit"),
+            Line("torque_floor", r"-\tau_{max}", "limit"),
             select="joint",
         ),
         TimeSeries(
-            "Energy", "J", (Line("kinetic", "T"), Line("potential", "U"), Line("total", "T + U"))
+            "Energy", "J", Line("kinetic", "T"), Line("potential", "U"), Line("total", "T + U")
         ),
-        Curve(
+        Curves(
             "Closed-loop eigenvalues",
-            "poles_re",
-            "poles_im",
             "Re [1/s]",
             "Im [1/s]",
-            points=True,
-            guide="imaginary-axis",
+            Trace("poles_re", "poles_im", style="points", series=1),
+            guide="left-half-plane",
         ),
-        Curve(
+        Curves(
             "Eigenvalues of one control period",
-            "map_re",
-            "map_im",
             "Re",
             "Im",
-            points=True,
+            Trace("map_re", "map_im", style="points", series=1),
             guide="unit-circle",
         ),
         Readout("rms_error", "RMS error", "rad"),

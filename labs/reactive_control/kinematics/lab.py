@@ -20,7 +20,7 @@ from labs.algorithms.orientation import (
 )
 from labs.lab import Inputs, Lab, Measurement, State
 from labs.models.arms import load
-from labs.params import Params, Value, choice, knob, toggle
+from labs.params import Group, Params, Value
 from labs.plots import Line, Matrix, Readout, TimeSeries
 from labs.reactive_control.kinematics.gimbal import Gimbal
 from labs.scene import Scene
@@ -43,15 +43,20 @@ RINGS = (0.2, 0.17)
 """[m] radii of the outer and the inner ring."""
 
 
+JOINTS_GROUP = Group("Joints")
+CHAIN = Group("Chain")
+ORIENTATION = Group("Orientation")
+GIMBAL_GROUP = Group("Gimbal")
+
+
 def _angle(i: int, default: float) -> Any:
     """The slider of joint i."""
-    return knob(
+    return JOINTS_GROUP.knob(
         default,
         -3.14,
         3.14,
-        symbol=f"q_{i}",
-        unit="rad",
-        group="Joints",
+        f"q_{i}",
+        "rad",
         step=0.01,
         help=f"Angle of joint {i}. The robot stops at its own limits"
         + ("; the UR5 has no seventh joint." if i == JOINTS else "."),
@@ -61,27 +66,17 @@ def _angle(i: int, default: float) -> Any:
 class KinematicsParams(Params):
     """What the user can turn."""
 
-    robot: str = choice(
-        "ur5",
-        {"ur5": "UR5", "panda": "Franka Panda"},
-        label="Robot",
-        group="Chain",
-        help="The arm: six joints or seven.",
-    )
-    factor: str = choice(
+    robot: str = CHAIN.choice("ur5", {"ur5": "UR5", "panda": "Franka Panda"}, "Robot")
+    """The arm: six joints or seven."""
+    factor: str = CHAIN.choice(
         "moved",
         {"moved": "of the joint moved last", **{str(i): str(i) for i in range(1, JOINTS + 1)}},
-        label="Factor shown",
-        symbol="i",
-        group="Chain",
-        help="Which factor of the chain to show, with its frame. The UR5's last is the sixth.",
+        "Factor shown",
+        "i",
     )
-    translucent: bool = toggle(
-        True,
-        label="Translucent arm",
-        group="Chain",
-        help="Draw the arm so that the frames inside it show.",
-    )
+    """Which factor of the chain to show, with its frame. The UR5's last is the sixth."""
+    translucent: bool = CHAIN.toggle(True, "Translucent arm")
+    """Draw the arm so that the frames inside it show."""
     q1: float = _angle(1, 0.4)
     q2: float = _angle(2, -1.2)
     q3: float = _angle(3, 1.3)
@@ -89,53 +84,24 @@ class KinematicsParams(Params):
     q5: float = _angle(5, -1.2)
     q6: float = _angle(6, 0.5)
     q7: float = _angle(7, 0.8)
-    sequence: str = choice(
-        "zyx",
-        {name: name.upper() for name in SEQUENCES},
-        label="Euler sequence",
-        group="Orientation",
-        help="About which axes the three Euler angles turn, each in the frame turned so far.",
+    sequence: str = ORIENTATION.choice(
+        "zyx", {name: name.upper() for name in SEQUENCES}, "Euler sequence"
     )
-    distance: float = knob(
-        0.035,
-        0.0,
-        1.57,
-        symbol=r"\delta",
-        unit="rad",
-        label="Distance from the lock",
-        group="Gimbal",
-        scale="log",
-        help="How far the middle angle of the body in the gimbal is from where it locks.",
+    """About which axes the three Euler angles turn, each in the frame turned so far."""
+    distance: float = GIMBAL_GROUP.knob(
+        0.035, 0.0, 1.57, r"\delta", "rad", "Distance from the lock", scale="log"
     )
-    direction: str = choice(
+    """How far the middle angle of the body in the gimbal is from where it locks."""
+    direction: str = GIMBAL_GROUP.choice(
         "lost",
         {"lost": "the lost direction", "first": "the first axis", "second": "the second axis"},
-        label="Wobble about",
-        group="Gimbal",
-        help="The fixed axis about which the body in the gimbal turns to and fro.",
+        "Wobble about",
     )
-    size: float = knob(
-        0.1,
-        0.0,
-        0.5,
-        symbol="A",
-        unit="rad",
-        label="Size of the wobble",
-        group="Gimbal",
-        step=0.005,
-        help="The body turns this far, to either side.",
-    )
-    frequency: float = knob(
-        0.25,
-        0.0,
-        2.0,
-        symbol="f",
-        unit="Hz",
-        label="Frequency",
-        group="Gimbal",
-        step=0.01,
-        help="Of the wobble. Its fastest angular speed is 2 pi f A.",
-    )
+    """The fixed axis about which the body in the gimbal turns to and fro."""
+    size: float = GIMBAL_GROUP.knob(0.1, 0.0, 0.5, "A", "rad", "Size of the wobble", step=0.005)
+    """The body turns this far, to either side."""
+    frequency: float = GIMBAL_GROUP.knob(0.25, 0.0, 2.0, "f", "Hz", "Frequency", step=0.01)
+    """Of the wobble. Its fastest angular speed is 2 pi f A."""
 
     @property
     def sliders(self) -> np.ndarray:
@@ -210,26 +176,30 @@ class Kinematics(Lab[KinematicsParams, KinematicsState]):
         TimeSeries(
             "Gimbal: Euler angles",
             "rad",
-            (Line("phi", r"\varphi"), Line("theta", r"\theta"), Line("psi", r"\psi", "dash")),
+            Line("phi", r"\varphi"),
+            Line("theta", r"\theta"),
+            Line("psi", r"\psi", "dash"),
         ),
         TimeSeries(
             "Gimbal: quaternion",
             "",
-            (Line("qw", "w"), Line("qx", "x"), Line("qy", "y"), Line("qz", "z")),
+            Line("qw", "w"),
+            Line("qx", "x"),
+            Line("qy", "y"),
+            Line("qz", "z"),
         ),
         TimeSeries(
             "Gimbal: amplification",
             "",
-            (
-                Line("amplification", r"\max|\dot\varphi_i| / |\omega|"),
-                Line("law", r"1 / |\cos\theta|", "dash"),
-                Line("quaternion_gain", r"|\dot Q| / |\omega|"),
-            ),
+            Line("amplification", r"\max|\dot\varphi_i| / |\omega|"),
+            Line("law", r"1 / |\cos\theta|", "dash"),
+            Line("quaternion_gain", r"|\dot Q| / |\omega|"),
         ),
         TimeSeries(
             "Gimbal: fastest angle and body",
             "rad/s",
-            (Line("rate", r"\max|\dot\varphi_i|"), Line("speed", r"|\omega|")),
+            Line("rate", r"\max|\dot\varphi_i|"),
+            Line("speed", r"|\omega|"),
         ),
         Readout("shown", "Factor shown, i", "", whole=True),
         Readout("orthogonality", "‖RᵀR − I‖", ""),

@@ -11,7 +11,7 @@ from labs.lab import Action, Inputs, Lab, Measurement, State
 from labs.models.arms import load
 from labs.models.plant import plant
 from labs.models.postures import POSTURES, ROBOTS, posture
-from labs.params import Params, Value, choice, knob
+from labs.params import Group, Params, Value
 from labs.plots import Bars, Line, Matrix, Readout, TimeSeries
 from labs.scene import Color, Scene
 
@@ -35,15 +35,19 @@ CAMERA = {
 }
 
 
+POSTURE = Group("Posture")
+VELOCITY_OF_THE_JOINTS = Group("Velocity of the joints")
+WRENCH_AT_THE_END_EFFECTOR = Group("Wrench at the end-effector")
+
+
 def _turn(joint: int) -> Any:
-    return knob(
+    return POSTURE.knob(
         0.0,
         -3.14,
         3.14,
-        symbol=f"\\Delta q_{joint}",
-        unit="rad",
-        label=f"Joint {joint}",
-        group="Posture",
+        f"\\Delta q_{joint}",
+        "rad",
+        f"Joint {joint}",
         step=0.01,
         help="Turns this joint away from the posture chosen. Without effect where the robot has "
         "no such joint.",
@@ -51,42 +55,39 @@ def _turn(joint: int) -> Any:
 
 
 def _speed(joint: int, default: float = 0.0) -> Any:
-    return knob(
+    return VELOCITY_OF_THE_JOINTS.knob(
         default,
         -2.0,
         2.0,
-        symbol=f"\\dot q_{joint}",
-        unit="rad/s",
-        label=f"Joint {joint}",
-        group="Velocity of the joints",
+        f"\\dot q_{joint}",
+        "rad/s",
+        f"Joint {joint}",
         step=0.01,
         help="The motion whose power is reckoned; the arm itself stays where it is.",
     )
 
 
 def _force(axis: str, default: float) -> Any:
-    return knob(
+    return WRENCH_AT_THE_END_EFFECTOR.knob(
         default,
         -300.0,
         300.0,
-        symbol=f"f_{axis}",
-        unit="N",
-        label=f"Force {axis}",
-        group="Wrench at the end-effector",
+        f"f_{axis}",
+        "N",
+        f"Force {axis}",
         step=1.0,
         help="In the world's axes. What was dragged in the scene adds to it.",
     )
 
 
 def _moment(axis: str) -> Any:
-    return knob(
+    return WRENCH_AT_THE_END_EFFECTOR.knob(
         0.0,
         -40.0,
         40.0,
-        symbol=f"m_{axis}",
-        unit="N·m",
-        label=f"Moment {axis}",
-        group="Wrench at the end-effector",
+        f"m_{axis}",
+        "N·m",
+        f"Moment {axis}",
         step=0.1,
         help="In the world's axes, drawn as an arc around the end-effector.",
     )
@@ -95,17 +96,12 @@ def _moment(axis: str) -> Any:
 class StaticsParams(Params):
     """What the user can turn."""
 
-    robot: str = choice(
-        "ur5",
-        {name: load(name).title for name in ROBOTS},
-        label="Robot",
-        group="Posture",
-        effect="restart",
-        help="The arm that is pulled at.",
+    robot: str = POSTURE.choice(
+        "ur5", {name: load(name).title for name in ROBOTS}, "Robot", effect="restart"
     )
-    posture: str = choice(
-        "home", POSTURES, label="Posture", group="Posture", help="What the joint sliders turn."
-    )
+    """The arm that is pulled at."""
+    posture: str = POSTURE.choice("home", POSTURES, "Posture")
+    """What the joint sliders turn."""
     q1: float = _turn(1)
     q2: float = _turn(2)
     q3: float = _turn(3)
@@ -197,10 +193,8 @@ class Statics(Lab[StaticsParams, StaticsState]):
         TimeSeries(
             "Power",
             "W",
-            (
-                Line("joint_power", r"P_\tau = \tau^T \dot q"),
-                Line("tip_power", "P_e = w^T v", "dash"),
-            ),
+            Line("joint_power", r"P_\tau = \tau^T \dot q"),
+            Line("tip_power", "P_e = w^T v", "dash"),
         ),
         Matrix(
             "Transposed Jacobian",
@@ -209,7 +203,7 @@ class Statics(Lab[StaticsParams, StaticsState]):
             shade=True,
         ),
         Bars("Torque per force, along each main direction", "per_force", r"\sigma_i(J_p)", "N·m/N"),
-        TimeSeries("Torques over time", "N·m", (Line("tau", r"\tau"),), select="joint"),
+        TimeSeries("Torques over time", "N·m", Line("tau", r"\tau"), select="joint"),
         Readout("force", "Force |f|", "N"),
         Readout("effort", "Torque |τ|", "N·m"),
         Readout("joint_power", "Power at the joints", "W"),

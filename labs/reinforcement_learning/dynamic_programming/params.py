@@ -3,7 +3,7 @@
 from pydantic import field_validator
 
 from labs.errors import LabError
-from labs.params import Params, choice, knob, text, toggle
+from labs.params import Group, Params
 from labs.reinforcement_learning.dynamic_programming.problems import HORIZON, grid_key, pendulum_key
 from labs.reinforcement_learning.dynamic_programming.side_by_side import METHODS, Rules
 from labs.tasks.grid_world.map import GridWorld
@@ -20,214 +20,62 @@ S......#..G..
 BRUSHES = {"#": "Wall, or none", "G": "Goal", "S": "Start", "C": "Cliff", ".": "Free"}
 
 
+WORLD = Group("World", effect="restart")
+GRID_WORLD = Group("Grid world", effect="solve")
+PENDULUM = Group("Pendulum", effect="solve")
+ITERATIONS = Group("Iterations", effect="solve")
+FINITE_HORIZON = Group("Finite horizon")
+CURSE_OF_DIMENSIONALITY = Group("Curse of dimensionality")
+
+
 class DynamicProgrammingParams(Params):
     """What the user can turn."""
 
-    world: str = choice(
-        "grid",
-        {"grid": "Grid world", "pendulum": "Pendulum"},
-        label="World",
-        group="World",
-        effect="restart",
-        help="A map to walk on, or a pendulum whose motor is too weak to lift it at once.",
+    world: str = WORLD.choice("grid", {"grid": "Grid world", "pendulum": "Pendulum"}, "World")
+    """A map to walk on, or a pendulum whose motor is too weak to lift it at once."""
+    gamma: float = WORLD.knob(0.95, 0.0, 1.0, r"\gamma", "", "Discount", step=0.005, effect="solve")
+    """Weight of the next step's cost. Every sweep brings the error down by it, at least."""
+    map: str = GRID_WORLD.text(POCKET, "Map", rows=8)
+    """# wall, . free, S start, G goal, C cliff; a last row of digits is the wind upwards. Or click
+    on the cells."""
+    brush: str = GRID_WORLD.choice("#", BRUSHES, "A click makes", effect="live")
+    """What a clicked cell becomes."""
+    slip: float = GRID_WORLD.knob(0.0, 0.0, 0.8, "p", "", "Slip", step=0.01)
+    """Probability that a step goes in a direction drawn evenly instead."""
+    kings: bool = GRID_WORLD.toggle(False, "Diagonal steps")
+    """Eight controls, the king's moves, instead of four."""
+    nodes: float = PENDULUM.knob(51, 11, 101, "n", "", "Grid size", step=2)
+    """Angles, and as many velocities: the table has n² rows."""
+    levels: float = PENDULUM.knob(5, 3, 11, "n_u", "", "Torque levels", step=2)
+    """Columns of the table."""
+    torque: float = PENDULUM.knob(2.5, 0.5, 6.0, r"u_{\max}", "N·m", "Torque limit", step=0.05)
+    """To hold the rod level takes 4.9 N·m: with less it has to be swung up."""
+    w_v: float = PENDULUM.knob(0.05, 0.0, 1.0, "w_v", "s²/rad²", "Cost of velocity", scale="log")
+    """Beside 1 for the square of the angle from upright [rad]."""
+    w_u: float = PENDULUM.knob(0.05, 0.0, 1.0, "w_u", "1/(N·m)²", "Cost of torque", scale="log")
+    """Beside 1 for the square of the angle from upright [rad]."""
+    shown: str = ITERATIONS.choice(
+        "value", METHODS | {"finite": "Finite horizon"}, "Shown and followed", effect="live"
     )
-    gamma: float = knob(
-        0.95,
-        0.0,
-        1.0,
-        symbol=r"\gamma",
-        unit="",
-        label="Discount",
-        group="World",
-        step=0.005,
-        effect="solve",
-        help="Weight of the next step's cost. Every sweep brings the error down by it, at least.",
+    """Whose values and policy the scene shows, and who drives the walker or the pendulum."""
+    m: float = ITERATIONS.knob(5, 1, 50, "m_k", "", "Evaluations", step=1)
+    """Of each policy in modified policy iteration; 1 is value iteration."""
+    tolerance: float = ITERATIONS.knob(
+        1e-6, 1e-9, 0.1, r"\varepsilon", "", "Tolerance", scale="log"
     )
-    map: str = text(
-        POCKET,
-        label="Map",
-        group="Grid world",
-        rows=8,
-        effect="solve",
-        help="# wall, . free, S start, G goal, C cliff; a last row of digits is the wind upwards. "
-        "Or click on the cells.",
-    )
-    brush: str = choice(
-        "#", BRUSHES, label="A click makes", group="Grid world", help="What a clicked cell becomes."
-    )
-    slip: float = knob(
-        0.0,
-        0.0,
-        0.8,
-        symbol="p",
-        unit="",
-        label="Slip",
-        group="Grid world",
-        step=0.01,
-        effect="solve",
-        help="Probability that a step goes in a direction drawn evenly instead.",
-    )
-    kings: bool = toggle(
-        False,
-        label="Diagonal steps",
-        group="Grid world",
-        effect="solve",
-        help="Eight controls, the king's moves, instead of four.",
-    )
-    nodes: float = knob(
-        51,
-        11,
-        101,
-        symbol="n",
-        unit="",
-        label="Grid size",
-        group="Pendulum",
-        step=2,
-        effect="solve",
-        help="Angles, and as many velocities: the table has n² rows.",
-    )
-    levels: float = knob(
-        5,
-        3,
-        11,
-        symbol="n_u",
-        unit="",
-        label="Torque levels",
-        group="Pendulum",
-        step=2,
-        effect="solve",
-        help="Columns of the table.",
-    )
-    torque: float = knob(
-        2.5,
-        0.5,
-        6.0,
-        symbol=r"u_{\max}",
-        unit="N·m",
-        label="Torque limit",
-        group="Pendulum",
-        step=0.05,
-        effect="solve",
-        help="To hold the rod level takes 4.9 N·m: with less it has to be swung up.",
-    )
-    w_v: float = knob(
-        0.05,
-        0.0,
-        1.0,
-        symbol="w_v",
-        unit="s²/rad²",
-        label="Cost of velocity",
-        group="Pendulum",
-        scale="log",
-        effect="solve",
-        help="Beside 1 for the square of the angle from upright [rad].",
-    )
-    w_u: float = knob(
-        0.05,
-        0.0,
-        1.0,
-        symbol="w_u",
-        unit="1/(N·m)²",
-        label="Cost of torque",
-        group="Pendulum",
-        scale="log",
-        effect="solve",
-        help="Beside 1 for the square of the angle from upright [rad].",
-    )
-    shown: str = choice(
-        "value",
-        METHODS | {"finite": "Finite horizon"},
-        label="Shown and followed",
-        group="Iterations",
-        help="Whose values and policy the scene shows, and who drives the walker or the pendulum.",
-    )
-    m: float = knob(
-        5,
-        1,
-        50,
-        symbol="m_k",
-        unit="",
-        label="Evaluations",
-        group="Iterations",
-        step=1,
-        effect="solve",
-        help="Of each policy in modified policy iteration; 1 is value iteration.",
-    )
-    tolerance: float = knob(
-        1e-6,
-        1e-9,
-        0.1,
-        symbol=r"\varepsilon",
-        unit="",
-        label="Tolerance",
-        group="Iterations",
-        scale="log",
-        effect="solve",
-        help="An iteration ends when a sweep changes no value by more.",
-    )
-    spread: float = knob(
-        0.0,
-        0.0,
-        50.0,
-        symbol="V_0",
-        unit="",
-        label="Initial values",
-        group="Iterations",
-        step=0.5,
-        effect="solve",
-        help="Drawn from 0 to this, by the seed, the same for all.",
-    )
-    warm: bool = toggle(
-        True,
-        label="Go on from present values",
-        group="Iterations",
-        effect="solve",
-        help="When the world changes; off: from the initial values again.",
-    )
-    to_go: float = knob(
-        12,
-        0,
-        HORIZON,
-        symbol="N-i",
-        unit="steps",
-        label="Time to go",
-        group="Finite horizon",
-        step=1,
-        help="How many steps are left.",
-    )
-    w_f: float = knob(
-        3.0,
-        0.0,
-        10.0,
-        symbol="w_f",
-        unit="",
-        label="Final cost",
-        group="Finite horizon",
-        step=0.1,
-        help="Of each cell (each radian) left to the goal in a straight line.",
-    )
-    joints: float = knob(
-        6,
-        1,
-        7,
-        symbol="j",
-        unit="",
-        label="Joints",
-        group="Curse of dimensionality",
-        step=1,
-        help="Of a robot whose table one would like to have.",
-    )
-    cuts: float = knob(
-        10,
-        2,
-        100,
-        symbol="c",
-        unit="",
-        label="Values of each",
-        group="Curse of dimensionality",
-        step=1,
-        help="Into how many values each angle and each velocity is cut.",
-    )
+    """An iteration ends when a sweep changes no value by more."""
+    spread: float = ITERATIONS.knob(0.0, 0.0, 50.0, "V_0", "", "Initial values", step=0.5)
+    """Drawn from 0 to this, by the seed, the same for all."""
+    warm: bool = ITERATIONS.toggle(True, "Go on from present values")
+    """When the world changes; off: from the initial values again."""
+    to_go: float = FINITE_HORIZON.knob(12, 0, HORIZON, "N-i", "steps", "Time to go", step=1)
+    """How many steps are left."""
+    w_f: float = FINITE_HORIZON.knob(3.0, 0.0, 10.0, "w_f", "", "Final cost", step=0.1)
+    """Of each cell (each radian) left to the goal in a straight line."""
+    joints: float = CURSE_OF_DIMENSIONALITY.knob(6, 1, 7, "j", "", "Joints", step=1)
+    """Of a robot whose table one would like to have."""
+    cuts: float = CURSE_OF_DIMENSIONALITY.knob(10, 2, 100, "c", "", "Values of each", step=1)
+    """Into how many values each angle and each velocity is cut."""
 
     @field_validator("map")
     @classmethod

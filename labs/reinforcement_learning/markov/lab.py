@@ -12,8 +12,8 @@ from pydantic_core.core_schema import ValidationInfo
 from labs.algorithms.markov_chain import evaluate, mean_costs
 from labs.errors import LabError
 from labs.lab import Inputs, Lab, Measurement, Snapshot, State
-from labs.params import Params, Value, choice, knob, text
-from labs.plots import Bars, Curve, Curves, Line, Matrix, Note, Readout, TimeSeries, Trace
+from labs.params import Group, Params, Value
+from labs.plots import Bars, Curves, Line, Matrix, Note, Readout, TimeSeries, Trace
 from labs.reinforcement_learning.markov.chains import TITLES, parse_rows, table_of, write_rows
 from labs.reinforcement_learning.markov.description import about_chain, about_value
 from labs.reinforcement_learning.markov.graph import REST, on_the_way
@@ -33,114 +33,44 @@ WAIT, HURRY = 0.4, 6.0
 """The part of a step that the token rests; at more steps a second it jumps."""
 
 
+CHAIN = Group("Chain", effect="restart")
+PROBABILITIES = Group("Probabilities", effect="solve")
+COSTS = Group("Costs", effect="solve")
+WALK = Group("Walk")
+
+
 class MarkovParams(Params):
     """What the user can turn."""
 
-    chain: str = choice(
-        "student",
-        TITLES,
-        label="Chain",
-        group="Chain",
-        effect="restart",
-        help="The states, their probabilities and costs. The machine has two controls.",
-    )
-    number: float = knob(
-        1.0,
-        1.0,
-        41.0,
-        symbol="n",
-        unit="",
-        label="Which random chain",
-        group="Chain",
-        step=1.0,
-        effect="restart",
-        help="Each number is another one of six states, for the random chain only.",
-    )
-    table: str = text(
+    chain: str = CHAIN.choice("student", TITLES, "Chain")
+    """The states, their probabilities and costs. The machine has two controls."""
+    number: float = CHAIN.knob(1.0, 1.0, 41.0, "n", "", "Which random chain", step=1.0)
+    """Each number is another one of six states, for the random chain only."""
+    table: str = CHAIN.text(
         "state, cost, Sun, Rain, Snow\nSun, 0, 2/3, 1/3, 0\nRain, 1, 1/2, 1/4, 1/4\n"
         "Snow, 3, 0, 1/2, 1/2",
-        label="Your table",
-        group="Chain",
+        "Your table",
         rows=5,
-        most=4000,
-        effect="restart",
-        help="For your own chain. CSV: a heading (state, control if any, cost, the states), then "
-        'a row each; or JSON: [{"state": "A", "cost": 1, "to": {"A": 1}}].',
+        max_length=4000,
     )
-    source: str = choice(
-        "1",
-        NUMBERS,
-        label="From state",
-        group="Probabilities",
-        effect="solve",
-        help="Whose beads lie on its ribbons; a click on a state's tile chooses it, too.",
-    )
-    target: str = choice(
-        "2",
-        NUMBERS,
-        label="To state",
-        group="Probabilities",
-        effect="solve",
-        help="Where the transition leads whose probability is shifted.",
-    )
-    shift: float = knob(
-        0.0,
-        -1.0,
-        1.0,
-        symbol="s",
-        unit="",
-        label="Shift it",
-        group="Probabilities",
-        step=0.01,
-        effect="solve",
-        help="Down to -1: never. Up to 1: always. The others of its row keep their proportions.",
-    )
-    rows: str = text(
-        "",
-        label="Changed rows",
-        group="Probabilities",
-        rows=3,
-        most=1000,
-        effect="solve",
-        help="Beads that are dragged write here: a state and its weights, 1: 0 0.5 0.5. For chains "
-        "without controls.",
-    )
-    gamma: float = knob(
-        0.9,
-        0.0,
-        1.0,
-        symbol=r"\gamma",
-        unit="",
-        label="Discount",
-        group="Costs",
-        step=0.01,
-        effect="solve",
-        help="What the cost of the next step counts today.",
-    )
-    first: float = knob(
-        1.0,
-        0.0,
-        1.0,
-        symbol=r"\pi(u_1 \mid x)",
-        unit="",
-        label="First control",
-        group="Costs",
-        step=0.01,
-        effect="solve",
-        help="How often the policy takes the first control of a table that has several, in every "
-        "state; the others share what is left.",
-    )
-    pace: float = knob(
-        1.5,
-        0.2,
-        200.0,
-        symbol=r"1/T",
-        unit="1/s",
-        label="Steps a second",
-        group="Walk",
-        scale="log",
-        help="Of the token.",
-    )
+    """For your own chain. CSV: a heading (state, control if any, cost, the states), then a row
+    each; or JSON: [{"state": "A", "cost": 1, "to": {"A": 1}}]."""
+    source: str = PROBABILITIES.choice("1", NUMBERS, "From state")
+    """Whose beads lie on its ribbons; a click on a state's tile chooses it, too."""
+    target: str = PROBABILITIES.choice("2", NUMBERS, "To state")
+    """Where the transition leads whose probability is shifted."""
+    shift: float = PROBABILITIES.knob(0.0, -1.0, 1.0, "s", "", "Shift it", step=0.01)
+    """Down to -1: never. Up to 1: always. The others of its row keep their proportions."""
+    rows: str = PROBABILITIES.text("", "Changed rows", rows=3, max_length=1000)
+    """Beads that are dragged write here: a state and its weights, 1: 0 0.5 0.5. For chains without
+    controls."""
+    gamma: float = COSTS.knob(0.9, 0.0, 1.0, r"\gamma", "", "Discount", step=0.01)
+    """What the cost of the next step counts today."""
+    first: float = COSTS.knob(1.0, 0.0, 1.0, r"\pi(u_1 \mid x)", "", "First control", step=0.01)
+    """How often the policy takes the first control of a table that has several, in every state; the
+    others share what is left."""
+    pace: float = WALK.knob(1.5, 0.2, 200.0, r"1/T", "1/s", "Steps a second", scale="log")
+    """Of the token."""
 
     @field_validator("table", "rows")
     @classmethod
@@ -200,41 +130,45 @@ class Markov(Lab[MarkovParams, MarkovState]):
         TimeSeries(
             "Probability of each state",
             "long run dashed",
-            (Line("mu", r"\mu"), Line("far", r"\bar\mu", "dash")),
+            Line("mu", r"\mu"),
+            Line("far", r"\bar\mu", "dash"),
             select="state",
         ),
         TimeSeries(
             "Share of the token's visits",
             "long run dashed",
-            (Line("visited", r"f"), Line("far", r"\bar\mu", "dash")),
+            Line("visited", r"f"),
+            Line("far", r"\bar\mu", "dash"),
             select="state",
         ),
-        Curve("Eigenvalues of P", "re", "im", "Re λ", "Im λ", points=True, guide="unit-circle"),
+        Curves(
+            "Eigenvalues of P",
+            "Re λ",
+            "Im λ",
+            Trace("re", "im", style="points", series=1),
+            guide="unit-circle",
+        ),
         Matrix("Transition matrix", "P", "P", shade=True),
         Note("The value in words", "value"),
         Bars("Cost-to-go by iteration, and exact", "V", r"V_k", "", marks="exact"),
         Curves(
             "Error of the iteration",
-            (
-                Trace("sweep", "error", "max|Vₖ − V|", "line", 1),
-                Trace("sweep", "bound", "γᵏ max|V₀ − V|", "dash", 2),
-            ),
             "iteration k",
             "error",
+            Trace("sweep", "error", "max|Vₖ − V|", "line", 1),
+            Trace("sweep", "bound", "γᵏ max|V₀ − V|", "dash", 2),
             log_y=True,
         ),
         Curves(
             "Mean cost (1 − γ) V over the discount",
-            (
-                *(
-                    Trace("gammas", f"mean_{x}", "other states" * (x == 1), "line", 7)
-                    for x in range(1, MOST + 1)
-                ),
-                Trace("gammas", "mean", "chosen state", "line", 1),
-                Trace("now", "span", "γ now", "dash", 2),
-            ),
             "γ",
             "cost of a step",
+            *(
+                Trace("gammas", f"mean_{x}", "other states" * (x == 1), "line", 7)
+                for x in range(1, MOST + 1)
+            ),
+            Trace("gammas", "mean", "chosen state", "line", 1),
+            Trace("now", "span", "γ now", "dash", 2),
         ),
         Matrix("Action values, a row a state", "Q", r"Q", shade=True),
         Readout("steps", "Steps walked", "", whole=True),

@@ -8,7 +8,7 @@ import numpy as np
 
 from labs.errors import LabError, ParameterError
 from labs.lab import Inputs, Lab, Measurement, Snapshot, State
-from labs.params import Value, choice, knob
+from labs.params import Group, Value
 from labs.plots import Curves, HeatMap, Line, Readout, TimeSeries, Trace
 from labs.random_numbers import seeded
 from labs.reinforcement_learning.td_control.params import BATCHES, METHODS, LearningParams
@@ -38,38 +38,18 @@ OPTIMAL = 1e-9
 """A greedy walk that costs this much more than the best at most is one of the best."""
 
 
+VIEW = Group("View")
+
+
 class TdParams(LearningParams):
     """What the user can turn."""
 
-    shown: str = choice(
-        "first",
-        {"first": "First", "second": "Second"},
-        label="Values of method",
-        group="View",
-        help="Whose estimates colour the scene and the maps.",
-    )
-    learner: float = knob(
-        1,
-        1,
-        10,
-        symbol="s",
-        unit="",
-        label="Learner",
-        group="View",
-        step=1,
-        help="Which of those who learn side by side is shown.",
-    )
-    control: float = knob(
-        0,
-        0,
-        8,
-        symbol=r"u_{map}",
-        unit="",
-        label="Control of the map",
-        group="View",
-        step=1,
-        help="The map of Q shows this control; 0: the best in each state.",
-    )
+    shown: str = VIEW.choice("first", {"first": "First", "second": "Second"}, "Values of method")
+    """Whose estimates colour the scene and the maps."""
+    learner: float = VIEW.knob(1, 1, 10, "s", "", "Learner", step=1)
+    """Which of those who learn side by side is shown."""
+    control: float = VIEW.knob(0, 0, 8, r"u_{map}", "", "Control of the map", step=1)
+    """The map of Q shows this control; 0: the best in each state."""
 
     @property
     def view(self) -> tuple[int, int]:
@@ -94,7 +74,7 @@ def _curves(title: str, y_label: str, mean: str, *edges: str) -> Curves:
         traces += [Trace(f"episodes_{name}", f"{edge}_{name}", "", "dash", 1 + i) for edge in edges]
     if mean in ("online", "offline"):
         traces.append(Trace("best_x", "best_y", "optimal", "dash"))
-    return Curves(title, tuple(traces), "episodes", y_label, log_y=True)
+    return Curves(title, "episodes", y_label, *tuple(traces), log_y=True)
 
 
 class TdControl(Lab[TdParams, TdState]):
@@ -116,7 +96,7 @@ class TdControl(Lab[TdParams, TdState]):
         HeatMap("Greedy policy", "x", "y", "policy", *AXES, "u"),
         HeatMap("Visits", "x", "y", "visits", *AXES, "log₁₀(1 + n)"),
         HeatMap("Error of min Q", "x", "y", "error", *AXES, "|V − V*|"),
-        TimeSeries("Cost of the walk in the scene", "", (Line("paid", "J"),), select="method"),
+        TimeSeries("Cost of the walk in the scene", "", Line("paid", "J"), select="method"),
         Readout("trained", "Episodes of each learner", "", whole=True),
         Readout("optimum", "Optimal cost", ""),
         Readout("greedy_first", "Greedy, median, first", ""),

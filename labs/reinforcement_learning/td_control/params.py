@@ -4,7 +4,7 @@ import numpy as np
 
 from labs.algorithms import exploration
 from labs.algorithms.exploration import Behavior
-from labs.params import choice, knob, toggle
+from labs.params import Group
 from labs.problems.episodes import Rule
 from labs.reinforcement_learning.td_control.tasks import Task, TaskParams
 
@@ -28,167 +28,49 @@ DIVERGED = 1e6
 """Times the largest cost: what no estimate reaches that converges."""
 
 
+LEARNING = Group("Learning", effect="solve")
+EXPLORATION = Group("Exploration", effect="solve")
+
+
 class LearningParams(TaskParams):
     """What fixes a training."""
 
-    method: str = choice(
-        "q-learning",
-        METHODS,
-        label="Method",
-        group="Learning",
-        effect="restart",
-        help="Blue in the scene.",
+    method: str = LEARNING.choice("q-learning", METHODS, "Method", effect="restart")
+    """Blue in the scene."""
+    second: str = LEARNING.choice(
+        "sarsa", {"none": "None", **METHODS}, "Second method", effect="restart"
     )
-    second: str = choice(
-        "sarsa",
-        {"none": "None", **METHODS},
-        label="Second method",
-        group="Learning",
-        effect="restart",
-        help="Orange. Both begin with the same luck.",
+    """Orange. Both begin with the same luck."""
+    n: float = LEARNING.knob(4, 1, 20, "n", "", "Steps", step=1)
+    """Costs that SARSA(n) waits for before it trusts its estimate of the rest."""
+    decay: float = LEARNING.knob(0.5, 0.0, 1.0, r"\lambda", "", "Trace decay", step=0.01)
+    """Of SARSA(λ): 0 is SARSA, 1 waits for all costs of the episode."""
+    replacing: bool = LEARNING.toggle(False, "Replacing traces")
+    """A pair met again has trace 1 instead of one more; keeps SARSA(λ) from diverging."""
+    offline: bool = LEARNING.toggle(False, "Learn at the end")
+    """SARSA(λ) takes all updates of an episode at its end."""
+    alpha: float = LEARNING.knob(0.5, 0.0, 1.0, r"\alpha", "", "Step size", step=0.01)
+    """How far one surprise moves an estimate."""
+    omega: float = LEARNING.knob(0.0, 0.0, 1.0, r"\omega", "", "Step decay", step=0.01)
+    """The k-th update has α/k^ω: 0 is constant, above 1/2 Robbins-Monro."""
+    q0: float = LEARNING.knob(0.0, 0.0, 50.0, "Q_0", "", "First guess", step=0.5, effect="restart")
+    """Of every Q. Below the truth is optimistic, above pessimistic."""
+    episodes: float = LEARNING.knob(500, BATCHES, 2000, "K", "", "Episodes", scale="log")
+    """Of one training, each of ten learners (pendulum: five); in about 250 batches."""
+    explorer: str = EXPLORATION.choice("epsilon-greedy", EXPLORERS, "Exploration")
+    """Who decides while learning. The other controller walks along the top row, or is PD."""
+    epsilon: float = EXPLORATION.knob(
+        0.1, 0.0, 1.0, r"\varepsilon", "", "Chance of any control", step=0.01
     )
-    n: float = knob(
-        4,
-        1,
-        20,
-        symbol="n",
-        unit="",
-        label="Steps",
-        group="Learning",
-        step=1,
-        effect="solve",
-        help="Costs that SARSA(n) waits for before it trusts its estimate of the rest.",
+    """For ε-greedy and for the other controller."""
+    fading: float = EXPLORATION.knob(0.0, 0.0, 1.0, "d", "", "Fading", step=0.01)
+    """At the k-th visit of a state ε/k^d: above 0 greedy in the limit (GLIE); β grows."""
+    beta: float = EXPLORATION.knob(
+        1.0, 0.01, 100.0, r"\beta", "", "Inverse temperature", scale="log"
     )
-    decay: float = knob(
-        0.5,
-        0.0,
-        1.0,
-        symbol=r"\lambda",
-        unit="",
-        label="Trace decay",
-        group="Learning",
-        step=0.01,
-        effect="solve",
-        help="Of SARSA(λ): 0 is SARSA, 1 waits for all costs of the episode.",
-    )
-    replacing: bool = toggle(
-        False,
-        label="Replacing traces",
-        group="Learning",
-        effect="solve",
-        help="A pair met again has trace 1 instead of one more; keeps SARSA(λ) from diverging.",
-    )
-    offline: bool = toggle(
-        False,
-        label="Learn at the end",
-        group="Learning",
-        effect="solve",
-        help="SARSA(λ) takes all updates of an episode at its end.",
-    )
-    alpha: float = knob(
-        0.5,
-        0.0,
-        1.0,
-        symbol=r"\alpha",
-        unit="",
-        label="Step size",
-        group="Learning",
-        step=0.01,
-        effect="solve",
-        help="How far one surprise moves an estimate.",
-    )
-    omega: float = knob(
-        0.0,
-        0.0,
-        1.0,
-        symbol=r"\omega",
-        unit="",
-        label="Step decay",
-        group="Learning",
-        step=0.01,
-        effect="solve",
-        help="The k-th update has α/k^ω: 0 is constant, above 1/2 Robbins-Monro.",
-    )
-    q0: float = knob(
-        0.0,
-        0.0,
-        50.0,
-        symbol="Q_0",
-        unit="",
-        label="First guess",
-        group="Learning",
-        step=0.5,
-        effect="restart",
-        help="Of every Q. Below the truth is optimistic, above pessimistic.",
-    )
-    episodes: float = knob(
-        500,
-        BATCHES,
-        2000,
-        symbol="K",
-        unit="",
-        label="Episodes",
-        group="Learning",
-        scale="log",
-        effect="solve",
-        help="Of one training, each of ten learners (pendulum: five); in about 250 batches.",
-    )
-    explorer: str = choice(
-        "epsilon-greedy",
-        EXPLORERS,
-        label="Exploration",
-        group="Exploration",
-        effect="solve",
-        help="Who decides while learning. The other controller walks along the top row, or is PD.",
-    )
-    epsilon: float = knob(
-        0.1,
-        0.0,
-        1.0,
-        symbol=r"\varepsilon",
-        unit="",
-        label="Chance of any control",
-        group="Exploration",
-        step=0.01,
-        effect="solve",
-        help="For ε-greedy and for the other controller.",
-    )
-    fading: float = knob(
-        0.0,
-        0.0,
-        1.0,
-        symbol="d",
-        unit="",
-        label="Fading",
-        group="Exploration",
-        step=0.01,
-        effect="solve",
-        help="At the k-th visit of a state ε/k^d: above 0 greedy in the limit (GLIE); β grows.",
-    )
-    beta: float = knob(
-        1.0,
-        0.01,
-        100.0,
-        symbol=r"\beta",
-        unit="",
-        label="Inverse temperature",
-        group="Exploration",
-        scale="log",
-        effect="solve",
-        help="Boltzmann: 0 tries all alike, large is greedy.",
-    )
-    bound: float = knob(
-        1.0,
-        0.0,
-        100.0,
-        symbol="L",
-        unit="",
-        label="Confidence",
-        group="Exploration",
-        scale="log",
-        effect="solve",
-        help="Width of the confidence bound, in units of cost.",
-    )
+    """Boltzmann: 0 tries all alike, large is greedy."""
+    bound: float = EXPLORATION.knob(1.0, 0.0, 100.0, "L", "", "Confidence", scale="log")
+    """Width of the confidence bound, in units of cost."""
 
     @property
     def methods(self) -> list[str]:

@@ -11,7 +11,7 @@ from pydantic import field_validator
 from labs.algorithms import policy_iteration
 from labs.algorithms.bellman import q_values
 from labs.errors import LabError
-from labs.params import Params, choice, knob, text, toggle
+from labs.params import Group, Params
 from labs.problems.episodes import Problem, problem
 from labs.problems.finite_mdp import FiniteMDP, random_policy
 from labs.tasks.grid_world.map import MAPS, GridWorld
@@ -25,6 +25,9 @@ PATIENCE = 0.99
 """Largest discount of the pendulum's costs, which have no end."""
 KP, KD = 10.0, 1.0
 """Gains of the PD controller [N m/rad], [N m s/rad]; far from upright its torque is cut off."""
+
+
+WORLD = Group("World", effect="solve")
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,79 +155,29 @@ def _task(
 class TaskParams(Params):
     """What fixes a task."""
 
-    system: str = choice(
-        "grid",
-        {"grid": "Grid world", "pendulum": "Pendulum"},
-        label="World",
-        group="World",
-        effect="restart",
-        help="A walk to the goal of the map below, or a pendulum that a weak motor swings up.",
+    system: str = WORLD.choice(
+        "grid", {"grid": "Grid world", "pendulum": "Pendulum"}, "World", effect="restart"
     )
-    map: str = text(
-        MAPS["cliff"],
-        label="Map",
-        group="World",
-        rows=8,
-        effect="solve",
-        help="S start, G goal, # wall, C cliff, . free; a last row of digits is wind, upwards.",
-    )
-    brush: str = choice(
+    """A walk to the goal of the map below, or a pendulum that a weak motor swings up."""
+    map: str = WORLD.text(MAPS["cliff"], "Map", rows=8)
+    """S start, G goal, # wall, C cliff, . free; a last row of digits is wind, upwards."""
+    brush: str = WORLD.choice(
         "G",
         {"G": "moves the goal", "S": "moves the start", "#": "walls up", "C": "makes cliff"},
-        label="A click on a cell",
-        group="World",
-        help="And walls or cliff clicked once more are free again.",
+        "A click on a cell",
+        effect="live",
     )
-    kings: bool = toggle(
-        False,
-        label="King's moves",
-        group="World",
-        effect="restart",
-        help="Diagonal steps too: eight controls instead of four.",
-    )
-    slip: float = knob(
-        0.0,
-        0.0,
-        0.5,
-        symbol=r"p_{slip}",
-        unit="",
-        label="Slip",
-        group="World",
-        step=0.01,
-        effect="solve",
-        help="Probability that a step on the grid goes wherever it likes.",
-    )
-    gamma: float = knob(
-        1.0,
-        0.0,
-        1.0,
-        symbol=r"\gamma",
-        unit="",
-        label="Discount",
-        group="World",
-        step=0.01,
-        effect="solve",
-        help="Of the next step's cost. The pendulum's task never ends: 0.99 at most there.",
-    )
-    effort: float = knob(
-        0.05,
-        0.0,
-        1.0,
-        symbol="w_u",
-        unit="1/(N·m)²",
-        label="Price of torque",
-        group="World",
-        scale="log",
-        effect="solve",
-        help="In the pendulum's cost, dt (e² + 0.05 v² + w_u τ²).",
-    )
-    anywhere: bool = toggle(
-        False,
-        label="Start anywhere",
-        group="World",
-        effect="solve",
-        help="Episodes begin in any state instead of the start.",
-    )
+    """And walls or cliff clicked once more are free again."""
+    kings: bool = WORLD.toggle(False, "King's moves", effect="restart")
+    """Diagonal steps too: eight controls instead of four."""
+    slip: float = WORLD.knob(0.0, 0.0, 0.5, r"p_{slip}", "", "Slip", step=0.01)
+    """Probability that a step on the grid goes wherever it likes."""
+    gamma: float = WORLD.knob(1.0, 0.0, 1.0, r"\gamma", "", "Discount", step=0.01)
+    """Of the next step's cost. The pendulum's task never ends: 0.99 at most there."""
+    effort: float = WORLD.knob(0.05, 0.0, 1.0, "w_u", "1/(N·m)²", "Price of torque", scale="log")
+    """In the pendulum's cost, dt (e² + 0.05 v² + w_u τ²)."""
+    anywhere: bool = WORLD.toggle(False, "Start anywhere")
+    """Episodes begin in any state instead of the start."""
 
     @field_validator("map")
     @classmethod

@@ -3,170 +3,59 @@
 import numpy as np
 
 from labs.algorithms.integrators import INTEGRATORS
-from labs.params import Params, choice, knob, toggle
+from labs.params import Group, Params
 from labs.problems.optimal_control import Problem
 from labs.tasks.motion.motions import MOTIONS, Motion, Weights, motion_problem
 
 STEPS = {0.01: "10 ms", 0.02: "20 ms", 0.04: "40 ms"}
 
 
+MOTION = Group("Motion", effect="restart")
+COST = Group("Cost", effect="solve")
+HORIZON = Group("Horizon", effect="solve")
+TARGET = Group("Target", effect="solve")
+
+
 class MotionParams(Params):
     """The motion, its cost and its horizon."""
 
-    system: str = choice(
-        "pendulum",
-        {name: motion.title for name, motion in MOTIONS.items()},
-        label="System",
-        group="Motion",
-        effect="restart",
-        help="What moves. All but the UR5 hang at first and should end upright and at rest.",
+    system: str = MOTION.choice(
+        "pendulum", {name: motion.title for name, motion in MOTIONS.items()}, "System"
     )
-    goal: float = knob(
-        300.0,
-        1.0,
-        1e5,
-        symbol="w_f",
-        unit="1/rad²",
-        label="Goal",
-        group="Cost",
-        scale="log",
-        effect="solve",
-        help="Weight of the distance from the goal at the end: of the posture, or the UR5's tip.",
+    """What moves. All but the UR5 hang at first and should end upright and at rest."""
+    goal: float = COST.knob(300.0, 1.0, 1e5, "w_f", "1/rad²", "Goal", scale="log")
+    """Weight of the distance from the goal at the end: of the posture, or the UR5's tip."""
+    rest: float = COST.knob(10.0, 0.01, 1e4, "w_{vf}", "s²/rad²", "Rest at the end", scale="log")
+    """Weight of the velocity at the end."""
+    posture: float = COST.knob(
+        0.1, 0.0, 10.0, "w_q", "1/(rad²·s)", "Posture on the way", scale="log"
     )
-    rest: float = knob(
-        10.0,
-        0.01,
-        1e4,
-        symbol="w_{vf}",
-        unit="s²/rad²",
-        label="Rest at the end",
-        group="Cost",
-        scale="log",
-        effect="solve",
-        help="Weight of the velocity at the end.",
+    """Weight of the distance from the goal on the way; of the UR5, from where it starts."""
+    velocity: float = COST.knob(
+        0.01, 0.0, 10.0, "w_v", "s/rad²", "Velocity on the way", scale="log"
     )
-    posture: float = knob(
-        0.1,
-        0.0,
-        10.0,
-        symbol="w_q",
-        unit="1/(rad²·s)",
-        label="Posture on the way",
-        group="Cost",
-        scale="log",
-        effect="solve",
-        help="Weight of the distance from the goal on the way; of the UR5, from where it starts.",
+    """Weight of the velocity on the way."""
+    control: float = COST.knob(1.0, 1e-4, 100.0, "w_u", "1/s", "Control", scale="log")
+    """Weight of the controls, R: each is measured in units of its own size u_0."""
+    horizon: float = HORIZON.knob(2.0, 0.5, 3.0, "T", "s", "Horizon", step=0.1)
+    """How long the motion may take; N = T / h steps."""
+    h: float = HORIZON.choice(0.02, STEPS, "Time step", "h", "s")
+    """Of the plan; the plant is integrated in steps of 5 ms."""
+    integrator: str = HORIZON.choice(
+        "rk4", {name: method.title for name, method in INTEGRATORS.items()}, "Integrator"
     )
-    velocity: float = knob(
-        0.01,
-        0.0,
-        10.0,
-        symbol="w_v",
-        unit="s/rad²",
-        label="Velocity on the way",
-        group="Cost",
-        scale="log",
-        effect="solve",
-        help="Weight of the velocity on the way.",
-    )
-    control: float = knob(
-        1.0,
-        1e-4,
-        100.0,
-        symbol="w_u",
-        unit="1/s",
-        label="Control",
-        group="Cost",
-        scale="log",
-        effect="solve",
-        help="Weight of the controls, R: each is measured in units of its own size u_0.",
-    )
-    horizon: float = knob(
-        2.0,
-        0.5,
-        3.0,
-        symbol="T",
-        unit="s",
-        label="Horizon",
-        group="Horizon",
-        step=0.1,
-        effect="solve",
-        help="How long the motion may take; N = T / h steps.",
-    )
-    h: float = choice(
-        0.02,
-        STEPS,
-        label="Time step",
-        symbol="h",
-        unit="s",
-        group="Horizon",
-        effect="solve",
-        help="Of the plan; the plant is integrated in steps of 5 ms.",
-    )
-    integrator: str = choice(
-        "rk4",
-        {name: method.title for name, method in INTEGRATORS.items()},
-        label="Integrator",
-        group="Horizon",
-        effect="solve",
-        help="The method that is x+ = f(x, u) in the plan; the plant goes by Runge-Kutta.",
-    )
-    limited: bool = toggle(
-        False,
-        label="Torque limit",
-        group="Horizon",
-        effect="solve",
-        help="Solve within |u| <= u_max and cut what is played to it (beyond the notes).",
-    )
-    limit: float = knob(
-        0.5,
-        0.2,
-        2.0,
-        symbol="u_{max}/u_0",
-        unit="",
-        label="Limit",
-        group="Horizon",
-        step=0.05,
-        effect="solve",
-        help="Most that a control may be, in units of its size u_0; only with the torque limit.",
-    )
+    """The method that is x+ = f(x, u) in the plan; the plant goes by Runge-Kutta."""
+    limited: bool = HORIZON.toggle(False, "Torque limit")
+    """Solve within |u| <= u_max and cut what is played to it (beyond the notes)."""
+    limit: float = HORIZON.knob(0.5, 0.2, 2.0, "u_{max}/u_0", "", "Limit", step=0.05)
+    """Most that a control may be, in units of its size u_0; only with the torque limit."""
 
-    target_x: float = knob(
-        0.4,
-        -0.8,
-        0.8,
-        symbol="p^*_x",
-        unit="m",
-        label="Target x",
-        group="Target",
-        step=0.01,
-        effect="solve",
-        help="Target of the UR5's tip; or drag the ball in the scene.",
-    )
-    target_y: float = knob(
-        -0.35,
-        -0.8,
-        0.8,
-        symbol="p^*_y",
-        unit="m",
-        label="Target y",
-        group="Target",
-        step=0.01,
-        effect="solve",
-        help="Target of the UR5's tip; or drag the ball in the scene.",
-    )
-    target_z: float = knob(
-        0.25,
-        0.05,
-        1.0,
-        symbol="p^*_z",
-        unit="m",
-        label="Target z",
-        group="Target",
-        step=0.01,
-        effect="solve",
-        help="Target of the UR5's tip; or drag the ball in the scene.",
-    )
+    target_x: float = TARGET.knob(0.4, -0.8, 0.8, "p^*_x", "m", "Target x", step=0.01)
+    """Target of the UR5's tip; or drag the ball in the scene."""
+    target_y: float = TARGET.knob(-0.35, -0.8, 0.8, "p^*_y", "m", "Target y", step=0.01)
+    """Target of the UR5's tip; or drag the ball in the scene."""
+    target_z: float = TARGET.knob(0.25, 0.05, 1.0, "p^*_z", "m", "Target z", step=0.01)
+    """Target of the UR5's tip; or drag the ball in the scene."""
 
     @property
     def motion(self) -> Motion:

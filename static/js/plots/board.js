@@ -4,7 +4,6 @@
 import { History } from "../history.js";
 import { Bars } from "./bars.js";
 import { element } from "./card.js";
-import { Curve } from "./curve.js";
 import { Curves } from "./curves.js";
 import { HeatMap } from "./heatmap.js";
 import { Matrix } from "./matrix.js";
@@ -13,7 +12,7 @@ import { forgetColours } from "./palette.js";
 import { Readouts } from "./readouts.js";
 import { TimeSeries } from "./timeseries.js";
 
-const KINDS = { TimeSeries, Curve, Curves, Bars, Matrix, HeatMap, Note };
+const KINDS = { TimeSeries, Curves, Bars, Matrix, HeatMap, Note };
 
 export class Board {
   constructor(lab) {

@@ -1,83 +1,111 @@
-// Several lines and sets of points in one chart, each of which the legend can switch off; axes
-// may be logarithmic.
+// Lines and sets of points in one chart, each of which the legend can switch off; axes may be
+// logarithmic.
 
 import { number } from "../format.js";
 import { card, element } from "./card.js";
 import { around, Chart } from "./chart.js";
+
+const SERIES = 8;
 
 export class Curves {
   constructor(plot) {
     this.plot = plot;
     Object.assign(this, card(plot.title, "", "canvas tall"));
     this.hidden = new Set(); // labels switched off
-    this.notes = new Map();
-    this.entries = plot.traces.map((trace) => (trace.label ? this.legend.appendChild(this.entry(trace)) : null));
+    this.entries = new Map(); // by label: the button, and its note
     this.chart = new Chart(this.body, () => this.draw());
   }
 
-  entry(trace) {
-    const button = element("button", trace.style === "points" ? "points" : trace.style === "dash" ? "dash" : "");
-    button.type = "button";
-    button.style.setProperty("--tone", tone(trace));
-    button.setAttribute("aria-pressed", "true");
-    button.title = "Show or hide";
-    button.append(element("span", "", trace.label));
-    if (trace.note) {
-      const note = button.appendChild(element("b", "note"));
-      this.notes.set(note, trace.note);
+  update(fields) {
+    this.curves = this.plot.traces.flatMap((trace) => this.expand(trace, fields));
+    this.name();
+    this.draw();
+  }
+
+  // The curves of a trace, one a column where its y is (n, k).
+  expand(trace, fields) {
+    const { log_x: logX, log_y: logY } = this.plot;
+    const place = (v, log) => (log ? Math.log10(v) : v); // of what is not positive: not finite
+    const xs = fields[trace.x] ?? [];
+    const ys = fields[trace.y] ?? [];
+    const several = Array.isArray(ys[0]);
+    const labels = Array.isArray(trace.label) ? trace.label : null;
+    const count = several ? ys[0].length : (labels?.length ?? 1);
+    return Array.from({ length: count }, (_, k) => ({
+      style: trace.style,
+      series: several && trace.series ? ((trace.series - 1 + k) % SERIES) + 1 : trace.series,
+      label: labels ? labels[k] : trace.label.replace("{}", k + 1),
+      note: trace.note ? (fields[trace.note] ?? [])[k] : undefined,
+      points: xs
+        .map((v, i) => [place(v, logX), place(several ? ys[i][k] : ys[i], logY)])
+        .filter(([a, b]) => Number.isFinite(a) && Number.isFinite(b)),
+    }));
+  }
+
+  // The legend has what is there; what has no points yet is faint in it.
+  name() {
+    const labelled = this.curves.filter(({ label }) => label);
+    const labels = labelled.map(({ label }) => label);
+    if (labels.join("\n") !== [...this.entries.keys()].join("\n")) {
+      this.entries = new Map(labelled.map((curve) => [curve.label, this.entry(curve)]));
+      this.legend.replaceChildren(...this.entries.values());
     }
+    for (const { label, note, points } of labelled) {
+      const button = this.entries.get(label);
+      button.classList.toggle("nothing", points.length === 0);
+      const text = button.querySelector(".note");
+      if (text) text.textContent = Number.isFinite(note) ? number(note) : "";
+    }
+  }
+
+  entry({ label, style, series, note }) {
+    const button = element("button", style === "points" ? "points" : style === "dash" ? "dash" : "");
+    button.type = "button";
+    button.style.setProperty("--tone", tone(series));
+    button.setAttribute("aria-pressed", String(!this.hidden.has(label)));
+    button.title = "Show or hide";
+    button.append(element("span", "", label), element("b", "note"));
     button.addEventListener("click", () => {
-      const shown = this.hidden.delete(trace.label) || !this.hidden.add(trace.label);
+      const shown = this.hidden.delete(label) || !this.hidden.add(label);
       button.setAttribute("aria-pressed", String(shown));
       this.draw();
     });
     return button;
   }
 
-  update(fields) {
-    const { traces, log_x: logX, log_y: logY } = this.plot;
-    this.data = traces.map(({ x, y }) => {
-      if (!fields[x] || !fields[y]) return [];
-      const xs = fields[x].flat();
-      const ys = fields[y].flat();
-      const place = (v, log) => (log ? Math.log10(v) : v); // of what is not positive: not finite
-      return xs.map((v, i) => [place(v, logX), place(ys[i], logY)]).filter(([a, b]) => Number.isFinite(a) && Number.isFinite(b));
-    });
-    this.data.forEach((points, i) => this.entries[i]?.classList.toggle("nothing", points.length === 0));
-    for (const [note, name] of this.notes) {
-      const [value] = fields[name]?.flat() ?? [];
-      note.textContent = Number.isFinite(value) ? number(value) : "";
-    }
-    this.draw();
-  }
-
-  // What is drawn. A trace without a label goes with the one of its colour.
+  // What is drawn. A curve without a label goes with the one of its colour.
   get shown() {
-    const gone = this.plot.traces.filter(({ label }) => this.hidden.has(label)).map(({ series }) => series);
-    return this.plot.traces
-      .map((trace, i) => ({ trace, points: this.data[i] }))
-      .filter(({ trace }) => (trace.label ? !this.hidden.has(trace.label) : !gone.includes(trace.series)));
+    const gone = this.curves.filter(({ label }) => this.hidden.has(label)).map(({ series }) => series);
+    return this.curves.filter(({ label, series }) => (label ? !this.hidden.has(label) : !gone.includes(series)));
   }
 
   draw() {
-    if (!this.data || !this.body.clientWidth) return;
+    if (!this.curves || !this.body.clientWidth) return;
     const { guide, equal, x_label: xLabel, y_label: yLabel, log_x: logX, log_y: logY } = this.plot;
     const shown = this.shown;
     const circle = guide === "unit-circle";
+    const axis = guide === "imaginary-axis" || guide === "left-half-plane";
     const extra = circle ? [-1, 1] : [];
-    const x = [...shown.flatMap(({ points }) => points.map(([a]) => a)), ...extra, ...(guide === "imaginary-axis" ? [0] : [])];
-    const y = [...shown.flatMap(({ points }) => points.map(([, b]) => b)), ...extra];
+    const x = around([...shown.flatMap(({ points }) => points.map(([a]) => a)), ...extra, ...(axis ? [0] : [])]);
+    const y = around([...shown.flatMap(({ points }) => points.map(([, b]) => b)), ...extra]);
+    // Beside a guide the frame stands still while points wander within it.
+    this.x = guide === "none" ? x : grown(this.x, x);
+    this.y = guide === "none" ? y : grown(this.y, y);
     const chart = this.chart;
-    chart.begin(around(x), around(y), { square: equal || circle, xLabel, yLabel, logX, logY });
-    const [, , y0, y1] = chart.ranges;
-    if (guide === "imaginary-axis") chart.line([0, y0], [0, y1], "guide");
+    chart.begin(this.x, this.y, { square: equal || circle, xLabel, yLabel, logX, logY });
+    const [x0, , y0, y1] = chart.ranges;
+    if (guide === "left-half-plane") {
+      const width = Math.max(0, chart.x(0) - chart.x(x0));
+      chart.add("rect", { x: chart.x(x0), y: chart.y(y1), width, height: chart.area.height, class: "stable" });
+    }
+    if (axis) chart.line([0, y0], [0, y1], "guide");
     if (circle) chart.add("circle", { cx: chart.x(0), cy: chart.y(0), r: chart.x(1) - chart.x(0), class: "guide stable" });
-    for (const { trace, points } of shown) this.trace(chart, trace, points);
+    for (const curve of shown) this.trace(chart, curve);
   }
 
-  trace(chart, { style, ...trace }, points) {
+  trace(chart, { style, series, points }) {
     const places = points.map(([a, b]) => [chart.x(a), chart.y(b)]);
-    const colour = `--tone: ${tone(trace)}`;
+    const colour = `--tone: ${tone(series)}`;
     if (style !== "points" && places.length > 1) {
       const path = places.map((place) => place.map((v) => v.toFixed(1)).join(",")).join(" ");
       chart.add("polyline", { class: `curve tone ${style}`, style: colour, points: path });
@@ -88,9 +116,17 @@ export class Curves {
     }
   }
 
-  clear() {}
+  clear() {
+    this.x = this.y = null;
+  }
 }
 
-function tone({ series }) {
+function tone(series) {
   return series ? `var(--series-${series})` : "var(--ink)";
+}
+
+// The old range while it fits and is not much too wide, else the wanted one.
+function grown(old, wanted) {
+  const fits = old && old[0] <= wanted[0] && old[1] >= wanted[1];
+  return fits && old[1] - old[0] < 3 * (wanted[1] - wanted[0]) ? old : wanted;
 }

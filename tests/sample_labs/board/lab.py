@@ -8,7 +8,7 @@ from pydantic import field_validator
 
 from labs.colors import sequential
 from labs.lab import Inputs, Lab, Measurement, State
-from labs.params import LONGEST_TEXT, Params, Value, knob, text
+from labs.params import LONGEST_TEXT, Group, Params, Value
 from labs.plots import Line, TimeSeries
 from labs.scene import Scene, cell_at, cell_centers
 
@@ -17,15 +17,19 @@ SIZE = 0.1
 WALL = (0.35, 0.37, 0.41)
 
 
+KNOBS = Group()
+
+
 class BoardParams(Params):
-    map: str = text(
+    map: str = KNOBS.text(
         "........\n........\n..###...\n....#...\n........\n........",
-        help="Rows of free cells (.) and walls (#).",
-        label="Map",
+        "Map",
         rows=6,
-        most=LONGEST_TEXT,
+        max_length=LONGEST_TEXT,
     )
-    rate: float = knob(1.0, 0.0, 5.0, symbol=r"\omega", unit="rad/s", help="How fast it waves.")
+    """Rows of free cells (.) and walls (#)."""
+    rate: float = KNOBS.knob(1.0, 0.0, 5.0, r"\omega", "rad/s")
+    """How fast it waves."""
 
     @field_validator("map")
     @classmethod
@@ -49,7 +53,7 @@ class Board(Lab[BoardParams, BoardState]):
     section = "T.3"
     summary = "A board to click, and a wave over it."
     Params = BoardParams
-    plots = (TimeSeries("Walls", "", (Line("walls", "n"), Line("held", "h"))),)
+    plots = (TimeSeries("Walls", "", Line("walls", "n"), Line("held", "h")),)
 
     def init(self, params: BoardParams, rng: np.random.Generator) -> BoardState:
         return BoardState()

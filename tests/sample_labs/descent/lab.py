@@ -9,21 +9,23 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from labs.lab import Lab, Measurement, Snapshot, State
-from labs.params import Params, knob
-from labs.plots import Curve, Readout
+from labs.params import Group, Params
+from labs.plots import Curves, Readout, Trace
 from labs.scene import Scene
 
 BOWL = np.array([1.0, 10.0])
 
 
+KNOBS = Group(effect="solve")
+
+
 class DescentParams(Params):
-    rate: float = knob(
-        0.05, 0.001, 0.09, symbol=r"\alpha", unit="", help="Step size.", effect="solve", step=0.001
-    )
-    many: float = knob(
-        200.0, 1.0, 1000.0, symbol="N", unit="", help="Iterations.", effect="solve", step=1.0
-    )
-    fade: float = knob(0.5, 0.0, 1.0, symbol="f", unit="", help="Of the path.")
+    rate: float = KNOBS.knob(0.05, 0.001, 0.09, r"\alpha", step=0.001)
+    """Step size."""
+    many: float = KNOBS.knob(200.0, 1.0, 1000.0, "N", step=1.0)
+    """Iterations."""
+    fade: float = KNOBS.knob(0.5, 0.0, 1.0, "f", effect="live")
+    """Of the path."""
 
 
 @dataclass
@@ -40,7 +42,7 @@ class Descent(Lab[DescentParams, DescentState]):
     summary = "A point walks down a bowl."
     Params = DescentParams
     plots = (
-        Curve("Path", "first", "second", "x_1", "x_2"),
+        Curves("Path", "x_1", "x_2", Trace("first", "second", style="line", series=1)),
         Readout("best", "Cost", ""),
     )
 

@@ -7,24 +7,26 @@ from typing import ClassVar
 import numpy as np
 
 from labs.lab import Action, Inputs, Lab, Measurement, Snapshot, State
-from labs.params import Params, Value, choice, knob, toggle
-from labs.plots import Bars, Curve, Curves, HeatMap, Line, Matrix, Note, Readout, TimeSeries, Trace
+from labs.params import Group, Params, Value
+from labs.plots import Bars, Curves, HeatMap, Line, Matrix, Note, Readout, TimeSeries, Trace
 from labs.scene import Scene
+
+KNOBS = Group()
 
 
 class OscillatorParams(Params):
-    omega: float = knob(
-        2.0, 0.1, 10.0, symbol=r"\omega", unit="rad/s", help="Frequency.", label="ω"
-    )
-    gain: float = knob(10.0, 0.0, 1000.0, symbol="k_p", unit="1/s", help="Gain.", scale="log")
-    shape: str = choice("sine", {"sine": "Sine", "square": "Square"}, help="Form.", label="Shape")
-    noisy: bool = toggle(False, help="Adds noise.", label="Noise")
-    start: float = knob(
-        1.0, -1.0, 1.0, symbol="x_0", unit="m", help="Where it starts.", effect="restart"
-    )
-    guess: float = knob(
-        9.0, 1.0, 100.0, symbol="a", unit="", help="The root sought is of it.", effect="solve"
-    )
+    omega: float = KNOBS.knob(2.0, 0.1, 10.0, r"\omega", "rad/s", "ω")
+    """Frequency."""
+    gain: float = KNOBS.knob(10.0, 0.0, 1000.0, "k_p", "1/s", scale="log")
+    """Gain."""
+    shape: str = KNOBS.choice("sine", {"sine": "Sine", "square": "Square"}, "Shape")
+    """Form."""
+    noisy: bool = KNOBS.toggle(False, "Noise")
+    """Adds noise."""
+    start: float = KNOBS.knob(1.0, -1.0, 1.0, "x_0", "m", effect="restart")
+    """Where it starts."""
+    guess: float = KNOBS.knob(9.0, 1.0, 100.0, "a", effect="solve")
+    """The root sought is of it."""
 
 
 @dataclass
@@ -42,17 +44,15 @@ class Oscillator(Lab[OscillatorParams, OscillatorState]):
     summary = "A point swings, and a solver draws a root."
     Params = OscillatorParams
     plots = (
-        TimeSeries("Position", "m", (Line("x", "x"), Line("both", "y", "dash")), select="part"),
-        Curve("Phase", "angle", "wave", "angle [rad]", "wave"),
+        TimeSeries("Position", "m", Line("x", "x"), Line("both", "y", "dash"), select="part"),
+        Curves("Phase", "angle [rad]", "wave", Trace("angle", "wave", style="line", series=1)),
         Curves(
             "Waves",
-            (
-                Trace("angle", "wave", "wave", "marked", 1, note="size"),
-                Trace("angle", "square", "square", "dash", 2),
-                Trace("size", "size", style="points"),
-            ),
             "angle [rad]",
             "wave",
+            Trace("angle", "wave", "wave", "marked", 1, note="size"),
+            Trace("angle", "square", "square", "dash", 2),
+            Trace("size", "size", style="points"),
             log_y=True,
         ),
         HeatMap("Field", "angle", "angle", "field", "a [rad]", "b [rad]", "value"),

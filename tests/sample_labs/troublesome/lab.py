@@ -7,18 +7,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labs.lab import Inputs, Lab, Measurement, State
-from labs.params import Params, choice
+from labs.params import Group, Params
 from labs.plots import Line, TimeSeries
 from labs.scene import Scene
 
+KNOBS = Group()
+
 
 class TroublesomeParams(Params):
-    fault: str = choice(
+    fault: str = KNOBS.choice(
         "none",
         {"none": "None", "trouble": "Trouble", "raise": "Raise", "hang": "Hang", "slow": "Slow"},
-        help="What goes wrong.",
-        label="Fault",
+        "Fault",
     )
+    """What goes wrong."""
 
 
 @dataclass
@@ -31,7 +33,7 @@ class Troublesome(Lab[TroublesomeParams, TroublesomeState]):
     section = "T.2"
     summary = "Goes wrong on demand."
     Params = TroublesomeParams
-    plots = (TimeSeries("Position", "m", (Line("x", "x"),)),)
+    plots = (TimeSeries("Position", "m", Line("x", "x")),)
 
     def init(self, params: TroublesomeParams, rng: np.random.Generator) -> TroublesomeState:
         return TroublesomeState()

@@ -25,6 +25,7 @@ from typing import NamedTuple
 import numpy as np
 
 from labs.algorithms.ddp_sweep import backward_pass
+from labs.algorithms.regularisation import Regularisation, regularisation
 from labs.errors import LabError
 from labs.problems.optimal_control import (
     Model,
@@ -32,14 +33,12 @@ from labs.problems.optimal_control import (
     Problem,
     diverges_at,
     expand,
+    gradient_norm,
     rollout,
-    steepness,
     timed,
     whole,
 )
 
-SMALLEST_MU = 1e-8
-"""[unit of Q_uu] below this the regularisation is zero."""
 HALVINGS = 12
 """Of alpha, at most."""
 ROUNDING = 1e-14
@@ -59,9 +58,11 @@ class Options:
     mu: float = 0.0
     """To start with."""
     mu_factor: float = 4.0
-    mu_limit: float = 1e9
+    mu_limit: float = 1e10
+    """Most, in parts of the size of Q_uu."""
     tolerance: float = 1e-10
-    """Converged once a full step is expected to lower J by less than this part of it."""
+    """Converged once a full step with mu = 0 is expected to lower J by at most this part of it:
+    it is zero where dJ/dU is, but for what pushes against the bound, and nowhere else."""
     iterations: int = 200
 
     def __post_init__(self) -> None:
@@ -143,14 +144,15 @@ def step_in_pieces(problem: Problem, options: Options, at: Iterate) -> Pieces[It
         expansion = expand(problem, at.X, at.U, options.second_order)
         model = yield from timed(expansion, seconds, "derivatives")
     begun = perf_counter()
-    found = _direction(problem, options, model, at)
+    allowed = regularisation(model, options.mu_factor, options.mu_limit)
+    found = _direction(problem, options, allowed, model, at)
     at = replace(
         at,
         w=found.w,
         K=found.K,
         mu=found.mu,
         iteration=at.iteration + 1,
-        gradient=steepness(problem, model, at.U),
+        gradient=gradient_norm(problem, model, at.U),
         expected=found.d_1 + 0.5 * found.d_2,
         actual=0.0,
         alpha=0.0,
@@ -159,10 +161,10 @@ def step_in_pieces(problem: Problem, options: Options, at: Iterate) -> Pieces[It
     seconds["backward"] = perf_counter() - begun
     if found.failed:
         at = replace(at, stopped=found.failed)
-    elif -at.expected <= options.tolerance * abs(at.cost):
+    elif at.mu == 0.0 and -at.expected <= options.tolerance * abs(at.cost):
         at = replace(at, converged=True, stopped=_farewell(at))
     else:
-        search = _search(problem, options, at, found.d_1, found.d_2)
+        search = _search(problem, options, allowed, at, found.d_1, found.d_2)
         at = yield from timed(search, seconds, "forward")
         if not at.stopped and at.iteration >= options.iterations:
             at = replace(at, stopped=_unfinished(at))
@@ -189,7 +191,9 @@ class Direction(NamedTuple):
     failed: str = ""
 
 
-def _direction(problem: Problem, options: Options, model: Model, at: Iterate) -> Direction:
+def _direction(
+    problem: Problem, options: Options, allowed: Regularisation, model: Model, at: Iterate
+) -> Direction:
     w, K = np.empty_like(at.w), np.empty_like(at.K)
     low = high = np.empty((0, 0))
     if problem.bound is not None:
@@ -203,11 +207,11 @@ def _direction(problem: Problem, options: Options, model: Model, at: Iterate) ->
         where, d_1, d_2 = sweep(mu)
         if where < 0:
             break
-        mu = max(mu * options.mu_factor, SMALLEST_MU)
-        if mu > options.mu_limit:
+        mu = allowed.grown(mu)
+        if mu > allowed.limit:
             why = (
                 f"Failed: Q_uu is not positive definite at step {where}, even with mu at its "
-                f"limit of {options.mu_limit:.0e}. Raise R, or leave out the second derivatives."
+                f"limit of {allowed.limit:.0e}. Raise R, or leave out the second derivatives."
             )
             return Direction(at.w, at.K, mu, failed=why)
     if mu > 0.0 and -d_1 - 0.5 * d_2 <= options.tolerance * abs(at.cost):
@@ -219,21 +223,25 @@ def _direction(problem: Problem, options: Options, model: Model, at: Iterate) ->
             )
             return Direction(at.w, at.K, at.mu, failed=why)
         # Is little expected because the end is near, or because mu holds w down?
-        mu, (where, d_1, d_2) = 0.0, sweep(0.0)
-        if where >= 0:
+        where, d_1_free, d_2_free = sweep(0.0)
+        if where < 0:
+            return Direction(w, K, 0.0, d_1_free, d_2_free)
+        slope = gradient_norm(problem, model, at.U) * float(np.abs(at.U).max())
+        if slope <= np.sqrt(options.tolerance) * abs(at.cost):
             why = (
                 f"Failed: the gradient vanishes, but the cost curves downward at step {where}: "
                 "this is not a minimum. Start from another first guess."
             )
             return Direction(at.w, at.K, at.mu, failed=why)
+        sweep(mu)
     return Direction(w, K, mu, d_1, d_2)
 
 
 def _search(
-    problem: Problem, options: Options, at: Iterate, d_1: float, d_2: float
+    problem: Problem, options: Options, allowed: Regularisation, at: Iterate, d_1: float, d_2: float
 ) -> Pieces[Iterate]:
     """The line search, and mu for the next iteration."""
-    more = max(at.mu * options.mu_factor, SMALLEST_MU)
+    more = allowed.grown(at.mu)
     diverged = 0
     for k in range(HALVINGS + 1):
         alpha = 0.5**k
@@ -244,21 +252,19 @@ def _search(
         unseen = max(abs(expected), abs(cost - at.cost)) <= ROUNDING * abs(at.cost)
         ratio = 1.0 if unseen else (cost - at.cost) / expected
         if expected < 0.0 and ratio > options.c1:
-            less = at.mu / options.mu_factor
-            less = less if less >= SMALLEST_MU else 0.0
             return replace(
                 at,
                 X=X,
                 U=U,
                 cost=cost,
-                mu=less if ratio >= options.c2 else more,
+                mu=allowed.shrunk(at.mu) if ratio >= options.c2 else more,
                 alpha=alpha,
                 expected=expected,
                 actual=cost - at.cost,
                 refused=False,
                 model=None,
             )
-    if more <= options.mu_limit:
+    if more <= allowed.limit:
         return replace(at, mu=more, refused=at.refused or at.mu == 0.0)
     why = (
         "every rollout along it diverges"
@@ -268,7 +274,7 @@ def _search(
     return replace(
         at,
         stopped=f"Failed: the line search is exhausted: {why}, with mu at its limit of "
-        f"{options.mu_limit:.0e}. Lower c_1, or start from another first guess.",
+        f"{allowed.limit:.0e}. Lower c_1, or start from another first guess.",
     )
 
 

@@ -13,16 +13,14 @@ and the expected change of the cost for a step alpha w is alpha d_1 + alpha^2 d_
 d_1 = sum w' Q_u, d_2 = sum w' Q_uu w.
 
 With bounds on the control (beyond the notes) w minimises the same quadratic model within them,
-by a projected Newton method, and K is zero in the rows of w that touch a bound (Tassa, Mansard
-and Todorov, "Control-limited differential dynamic programming", 2014).
+by an active-set method, and K is zero in the rows of w that a bound holds (Tassa, Mansard and
+Todorov, "Control-limited differential dynamic programming", 2014).
 """
 
 import numpy as np
 
+from labs.algorithms.box_qp import box_qp, cholesky, cholesky_solve
 from labs.compiled import compiled
-
-NEWTON, HALVINGS = 50, 30
-"""At most, of the projected Newton method and of its line search."""
 
 
 @compiled
@@ -80,16 +78,15 @@ def backward_pass(
         Q_u[:] = slopes[n:]
         for i in range(m):
             held[i] = False
-            w[t, i] = 0.0
         if bounded:
-            if not _within(H, n, mu, Q_u, low[t], high[t], w[t], held, L):
+            if not box_qp(H[n:, n:], mu, Q_u, low[t], high[t], w[t], held, L):
                 return t, 0.0, 0.0
-        elif not _cholesky(H, n, mu, held, L):
+        elif not cholesky(H[n:, n:], mu, held, L):
             return t, 0.0, 0.0
         else:
             for i in range(m):
                 w[t, i] = -Q_u[i]
-            _solve(L, w[t])
+            cholesky_solve(L, w[t])
         gain = K[t]
         for i in range(m):
             for j in range(n):
@@ -174,42 +171,6 @@ def _value(
 
 
 @compiled
-def _cholesky(H: np.ndarray, n: int, mu: float, held: np.ndarray, L: np.ndarray) -> bool:
-    """L L' = Q_uu + mu I over the entries not held, those held replaced by the identity; False if
-    it is not positive definite."""
-    m = len(held)
-    for i in range(m):
-        for j in range(i + 1):
-            if held[i] or held[j]:
-                L[i, j] = 1.0 if i == j else 0.0
-                continue
-            rest = H[n + i, n + j] + (mu if i == j else 0.0)
-            for k in range(j):
-                rest -= L[i, k] * L[j, k]
-            if i > j:
-                L[i, j] = rest / L[j, j]
-            elif rest > 1e-14 * (abs(H[n + i, n + i]) + mu):
-                L[i, i] = np.sqrt(rest)
-            else:
-                return False
-    return True
-
-
-@compiled
-def _solve(L: np.ndarray, y: np.ndarray) -> None:
-    """y becomes (L L')^-1 y."""
-    m = len(y)
-    for i in range(m):
-        for k in range(i):
-            y[i] -= L[i, k] * y[k]
-        y[i] /= L[i, i]
-    for i in range(m - 1, -1, -1):
-        for k in range(i + 1, m):
-            y[i] -= L[k, i] * y[k]
-        y[i] /= L[i, i]
-
-
-@compiled
 def _solve_columns(L: np.ndarray, Y: np.ndarray) -> None:
     """Y becomes (L L')^-1 Y."""
     m, n = Y.shape
@@ -225,57 +186,3 @@ def _solve_columns(L: np.ndarray, Y: np.ndarray) -> None:
                 Y[i, j] -= L[k, i] * Y[k, j]
         for j in range(n):
             Y[i, j] /= L[i, i]
-
-
-@compiled
-def _within(
-    H: np.ndarray,
-    n: int,
-    mu: float,
-    Q_u: np.ndarray,
-    low: np.ndarray,
-    high: np.ndarray,
-    w: np.ndarray,
-    held: np.ndarray,
-    L: np.ndarray,
-) -> bool:
-    """Minimises w' (Q_uu + mu I) w / 2 + Q_u' w within low <= w <= high by projected Newton
-    steps from w = 0, which is within. Leaves in `held` the entries at a bound that push against
-    it and in L the factor over the others; False if that part is not positive definite."""
-    m = len(w)
-    slope, newton, trial = np.empty(m), np.empty(m), np.empty(m)
-    value = 0.0
-    for _ in range(NEWTON):
-        for i in range(m):
-            slope[i] = Q_u[i] + mu * w[i]
-            for j in range(m):
-                slope[i] += H[n + i, n + j] * w[j]
-        for i in range(m):
-            held[i] = (w[i] <= low[i] and slope[i] > 0.0) or (w[i] >= high[i] and slope[i] < 0.0)
-            newton[i] = 0.0 if held[i] else -slope[i]
-        if not _cholesky(H, n, mu, held, L):
-            return False
-        _solve(L, newton)
-        steepness = 0.0
-        for i in range(m):
-            steepness += newton[i] * slope[i]
-        if steepness > -1e-16 * (1.0 + abs(value)):
-            return True
-        step = 1.0
-        for _ in range(HALVINGS):
-            for i in range(m):
-                trial[i] = min(max(w[i] + step * newton[i], low[i]), high[i])
-            reached = forecast = 0.0
-            for i in range(m):
-                forecast += slope[i] * (trial[i] - w[i])
-                reached += trial[i] * (Q_u[i] + 0.5 * mu * trial[i])
-                for j in range(m):
-                    reached += 0.5 * trial[i] * H[n + i, n + j] * trial[j]
-            if reached <= value + 0.1 * forecast:
-                break
-            step *= 0.5
-        else:
-            return True  # no step improves: w is the minimum to rounding
-        value = reached
-        w[:] = trial
-    return True

@@ -20,6 +20,8 @@ T = TypeVar("T")
 
 FARTHEST = 1e6
 """A state beyond this, in its units, has diverged."""
+AT_BOUND = 1e-12
+"""A control within this part of its bound is at it: sums such as U + w round."""
 
 
 class Dynamics(Protocol):
@@ -178,9 +180,10 @@ def diverges_at(X: np.ndarray) -> int:
         return int(np.argmax(~(np.abs(X).max(axis=1) <= FARTHEST)))
 
 
-def steepness(problem: Problem, model: Model, U: np.ndarray) -> float:
+def gradient_norm(problem: Problem, model: Model, U: np.ndarray) -> float:
     """max |dJ/dU| on the trajectory the model is about, without what pushes against the bound."""
-    slope = costate(model.A, model.B, model.cost.l_x, model.cost.l_u)
+    gradient = costate(model.A, model.B, model.cost.l_x, model.cost.l_u)
     if problem.bound is not None:
-        slope[((problem.bound <= U) & (slope < 0.0)) | ((-problem.bound >= U) & (slope > 0.0))] = 0
-    return float(np.abs(slope).max())
+        most = (1.0 - AT_BOUND) * problem.bound
+        gradient[((most <= U) & (gradient < 0.0)) | ((-most >= U) & (gradient > 0.0))] = 0.0
+    return float(np.abs(gradient).max())

@@ -291,7 +291,7 @@ def test_regularisation_at_its_limit_is_said() -> None:
     at = ddp.solve(negative, guess(p), Options(mu_limit=1.0))
     assert not at.converged
     assert at.stopped.startswith("Failed: Q_uu is not positive definite at step 59")
-    assert "limit of 1e+00" in at.stopped
+    assert "limit of 2e+02" in at.stopped, "Q_uu is -200, and mu_limit in parts of its size"
     assert at.cost == ddp.init(negative, guess(p), Options()).cost, "nothing was moved"
 
 

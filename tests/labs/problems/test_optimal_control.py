@@ -10,9 +10,9 @@ from labs.problems.optimal_control import (
     Problem,
     diverges_at,
     expand,
+    gradient_norm,
     rollout,
     second_derivatives,
-    steepness,
     whole,
 )
 from labs.tasks.motion.cost import MotionCost, Reach
@@ -120,7 +120,7 @@ def test_the_gradient_by_the_costate_is_that_of_finite_differences(name: str) ->
         ahead = simulated(p, moved)[2]
         moved[index] -= 2 * eps
         slopes[index] = (ahead - simulated(p, moved)[2]) / (2 * eps)
-    found = steepness(p, whole(expand(p, X, U, second_order=False)), U)
+    found = gradient_norm(p, whole(expand(p, X, U, second_order=False)), U)
     assert found == pytest.approx(np.abs(slopes).max(), rel=1e-6)
 
 
@@ -132,12 +132,12 @@ def test_a_gradient_that_pushes_against_the_bound_does_not_count() -> None:
     U[0, 0] = downhill * 1e-3
     X, U, _ = simulated(p, U)
     model = whole(expand(p, X, U, second_order=False))
-    free = steepness(p, model, U)
+    free = gradient_norm(p, model, U)
     bounded = Problem(p.dynamics, p.cost, p.x0, 1, bound=np.array([1e-3]))
     wider = Problem(p.dynamics, p.cost, p.x0, 1, bound=np.array([2e-3]))
     assert free > 0.0
-    assert steepness(wider, model, U) == free
-    assert steepness(bounded, model, U) == 0.0
+    assert gradient_norm(wider, model, U) == free
+    assert gradient_norm(bounded, model, U) == 0.0
 
 
 def test_a_rollout_follows_the_policy_within_the_bound() -> None:

@@ -20,6 +20,7 @@ from labs.algorithms.side_by_side import (
     start,
 )
 from labs.models.finite_mdp import FiniteMDP, random_policy
+from labs.rounding import rounded_up
 from tests.labs.algorithms.random_mdps import random_mdp
 
 RULES = Rules(3, 1e-8)
@@ -53,7 +54,10 @@ def test_each_goes_as_if_it_were_alone() -> None:
         np.testing.assert_array_equal(last.errors[len(sweeps) :, i], errors[-1])
         made = [sweep.backups for sweep in sweeps]
         np.testing.assert_array_equal(last.backups[1 : len(sweeps) + 1, i], made)
-    assert last.verdict == "All four iterations have converged."
+    assert last.verdict == (
+        "All four iterations have converged: the largest distance left is "
+        f"{rounded_up(last.errors[-1].max())}."
+    )
     assert not at.verdict
 
 

@@ -5,8 +5,9 @@ from decimal import ROUND_CEILING, Context, Decimal
 
 
 def rounded_up(value: float, digits: int = 2) -> str:
-    """`value` in so many significant digits, never below it: for what is said to be a bound."""
+    """`value` in so many significant digits, 6 at most, never below it: for what is said to be a
+    bound."""
     if not math.isfinite(value):
         return f"{value:g}"
     up = Context(prec=digits, rounding=ROUND_CEILING).plus(Decimal(float(value)))
-    return f"{float(up):.{digits}g}"
+    return f"{float(up):g}"

@@ -14,7 +14,7 @@ from labs.rounding import rounded_up
     [
         (0.000846, 1, "0.0009"),
         (0.000846, 2, "0.00085"),
-        (142.3, 2, "1.5e+02"),
+        (142.3, 2, "150"),
         (142.3, 3, "143"),
         (0.1, 2, "0.11"),  # the float is a little more than a tenth
         (0.5, 2, "0.5"),

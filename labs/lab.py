@@ -124,7 +124,8 @@ class Lab(abc.ABC, Generic[P, S]):
         return {}
 
     def fields(self, params: P, state: S) -> Mapping[str, np.ndarray]:
-        """Arrays for curves, heat maps, matrices and bars; asked for a few times a second."""
+        """Arrays for curves, heat maps, matrices and bars; asked for a few times a second. Finite
+        but for plots that may have gaps, where NaN is what has no value."""
         return {}
 
     def notes(self, params: P, state: S) -> Mapping[str, str]:

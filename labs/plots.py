@@ -91,7 +91,8 @@ class Curves:
 
 @dataclass(frozen=True)
 class HeatMap:
-    """A 2-D field z over 1-D fields x (columns) and y (rows)."""
+    """A 2-D field z over 1-D fields x (columns) and y (rows). With `gaps` z may be NaN where
+    there is no value: the cell stays empty."""
 
     title: str
     x: str
@@ -100,6 +101,7 @@ class HeatMap:
     x_label: str
     y_label: str
     z_label: str
+    gaps: bool = False
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,8 @@ class Matrix:
 @dataclass(frozen=True)
 class Bars:
     """A 1-D field as bars, with the limit (a 1-D field) each must stay within, and with marks (a
-    1-D field, which may be empty) across the bars where each ought to end."""
+    1-D field, which may be empty) across the bars where each ought to end. With `gaps` bars and
+    marks may be NaN where there is no value: they are left out."""
 
     title: str
     field: str
@@ -125,6 +128,7 @@ class Bars:
     unit: str
     limit: str = ""
     marks: str = ""
+    gaps: bool = False
 
 
 @dataclass(frozen=True)
@@ -170,6 +174,17 @@ def pictured(plot: Plot) -> tuple[str, ...]:
             return tuple(name for name in (field, limit, marks) if name)
         case Note(note=note):
             return (note,)
+        case _:
+            return ()
+
+
+def may_have_gaps(plot: Plot) -> tuple[str, ...]:
+    """The fields a plot shows in which NaN stands for what has no value."""
+    match plot:
+        case HeatMap(z=z, gaps=True):
+            return (z,)
+        case Bars(field=field, marks=marks, gaps=True):
+            return (field, marks)
         case _:
             return ()
 

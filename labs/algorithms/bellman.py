@@ -4,7 +4,8 @@
     (T V)(x)    = min over u of         [ C(x, u) + gamma sum over y of P^u(x, y) V(y) ]
 
 Both contract distances in the max norm by gamma: |T V - T W| <= gamma |V - W|, since the rows of
-P sum to 1. So |V - TV| <= e puts the fixed point within gamma e / (1 - gamma) of TV.
+P sum to 1. So |V - TV| <= e puts the fixed point within gamma e / (1 - gamma) of TV; for gamma = 1
+it says nothing of that distance.
 
 A backup is one bracket: T takes X U of them, T^pi as many as there are controls it may use. Where
 the dynamics are a table the loops are compiled, otherwise they are products of arrays.
@@ -17,9 +18,13 @@ import numpy as np
 
 from labs.compiled import compiled
 from labs.problems.finite_mdp import FiniteMDP
+from labs.rounding import rounded_up
 
 TIE = 1e-12
-"""Relative to 1 + |Q|: controls this close are equally good, and the present one is kept."""
+"""Relative to max|C| + max|V|: controls this close are equally good, and the present one is
+kept."""
+NO_BOUND = "with gamma = 1 that bounds no distance to the limit"
+"""How the sentence ends of an iteration that stopped without knowing how near it is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,22 +55,28 @@ def until_done(step: Callable[[Sweep], Sweep], at: Sweep) -> Iterator[Sweep]:
         yield at
 
 
-def converged(mdp: FiniteMDP, change: float, tolerance: float) -> str:
-    """A sentence once the last sweep changed no value by more than `tolerance`, else empty."""
+def converged(mdp: FiniteMDP, V: np.ndarray, change: float, tolerance: float) -> str:
+    """A sentence once the last sweep, which led to V (X,), changed no value by more than
+    `tolerance`, else empty."""
     if not change <= tolerance:
         return ""
     if change == 0.0:
         return "The last sweep changed no value."
     if mdp.gamma == 1.0:
-        return f"The last sweep changed no value by more than {tolerance:g}."
-    far = error_bound(mdp.gamma, change)
-    return f"No value changed by more than {tolerance:g}: the limit is within {far:.1g}."
+        return f"The last sweep changed no value by more than {float(tolerance)}; {NO_BOUND}."
+    # A backup adds up this many terms at most, each of them and each sum rounded.
+    terms = mdp.U + (1 if mdp.deterministic else mdp.X)
+    size = _size(mdp, V) + change
+    far = error_bound(mdp.gamma, change, terms * np.finfo(float).eps * size)
+    return (
+        f"No value changed by more than {float(tolerance)}: the limit is within {rounded_up(far)}."
+    )
 
 
-def error_bound(gamma: float, change: float) -> float:
+def error_bound(gamma: float, change: float, rounding: float = 0.0) -> float:
     """How far the values can be from the fixed point after a sweep that changed them by
-    `change`, in the max norm; infinite for gamma = 1."""
-    return gamma * change / (1.0 - gamma) if gamma < 1.0 else float("inf")
+    `change` and was exact to `rounding`, in the max norm; infinite for gamma = 1."""
+    return (gamma * change + rounding) / (1.0 - gamma) if gamma < 1.0 else float("inf")
 
 
 def q_values(mdp: FiniteMDP, V: np.ndarray) -> np.ndarray:
@@ -74,10 +85,18 @@ def q_values(mdp: FiniteMDP, V: np.ndarray) -> np.ndarray:
         table: np.ndarray = mdp.C + mdp.gamma * V[mdp.successor]
         return table
     endless = ~np.isfinite(V)
-    Q: np.ndarray = mdp.C + mdp.gamma * (mdp.probabilities @ np.where(endless, 0.0, V)).T
+    Q: np.ndarray = mdp.C + mdp.gamma * (mdp.probabilities @ _finite(V)).T
     if endless.any():
         Q[(mdp.probabilities @ endless.astype(float)).T > 0.0] = np.inf
     return Q
+
+
+def _finite(V: np.ndarray) -> np.ndarray:
+    return np.where(np.isfinite(V), V, 0.0)
+
+
+def _size(mdp: FiniteMDP, V: np.ndarray) -> float:
+    return mdp.largest_cost + float(np.abs(_finite(V)).max())
 
 
 def optimal_backup(
@@ -88,12 +107,13 @@ def optimal_backup(
     if mdp.successor is not None:
         ahead, better = np.empty(mdp.X), np.empty(mdp.X, np.int64)
         old = policy if policy.ndim == 1 else np.full(mdp.X, -1)
-        change = _minimise(V, mdp.C, mdp.successor, mdp.gamma, old, ahead, better)
+        tie = TIE * _size(mdp, V)
+        change = _minimise(V, mdp.C, mdp.successor, mdp.gamma, old, tie, ahead, better)
         return ahead, better, change
     Q = q_values(mdp, V)
     ahead, better = Q.min(axis=1), Q.argmin(axis=1)
     if policy.ndim == 1:
-        kept = Q[np.arange(mdp.X), policy] <= ahead + TIE * (1.0 + np.abs(ahead))
+        kept = Q[np.arange(mdp.X), policy] <= ahead + TIE * _size(mdp, V)
         better = np.where(kept, policy, better)
     return ahead, better, float(np.abs(ahead - V).max())
 
@@ -120,6 +140,7 @@ def _minimise(
     successor: np.ndarray,
     gamma: float,
     old: np.ndarray,
+    tie: float,
     ahead: np.ndarray,
     policy: np.ndarray,
 ) -> float:
@@ -137,7 +158,7 @@ def _minimise(
         kept = old[x]
         if kept >= 0:
             cost = C[x, kept] + gamma * V[successor[x, kept]]
-            if cost <= best + TIE * (1.0 + abs(best)):
+            if cost <= best + tie:
                 policy[x] = kept
         change = max(change, abs(best - V[x]))
     return change

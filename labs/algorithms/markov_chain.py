@@ -16,7 +16,8 @@ roots of 1 as eigenvalues; otherwise all the rest lies inside the unit circle (P
 
 With gamma = 1, I - P is singular: 1 is an eigenvalue of P. V exists all the same where the chain
 is sure to end in states that cost nothing (V = 0 there; without them the system is regular).
-Anywhere else costs are added for ever.
+Anywhere else costs are added for ever. Where a chain can end is a matter of its graph, of which
+entries of P are 0, and not of computed probabilities.
 """
 
 from collections.abc import Iterator
@@ -26,7 +27,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 TOLERANCE = 1e-9
-"""Error of V, relative to its largest entry, that ends the iteration."""
+"""Error of V, relative to its largest entry, that ends the iteration: nine digits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +50,11 @@ class CostToGo:
     """(X,); 0 where the costs have no finite sum."""
     finite: np.ndarray
     """(X,) bool: where they have one. All of them for gamma < 1."""
+
+    @property
+    def known(self) -> np.ndarray:
+        """(X,) V, and NaN where it has no value."""
+        return np.where(self.finite, self.V, np.nan)
 
 
 def communicating_classes(P: np.ndarray) -> list[Class]:
@@ -97,16 +103,45 @@ def stationary(P: np.ndarray, closed: Class) -> np.ndarray:
     return pi
 
 
+def leads_to(P: np.ndarray, goal: np.ndarray) -> np.ndarray:
+    """(X,) bool: from where the chain may come into `goal` (X,) bool, those in it included."""
+    found = goal
+    while True:
+        more = found | (P[:, found] > 0.0).any(axis=1)
+        if (more == found).all():
+            return found
+        found = more
+
+
+def _transient_sums(P: np.ndarray, gamma: float, inside: np.ndarray, B: np.ndarray) -> np.ndarray:
+    """(n, k): (I - gamma P_TT)^-1 B, what B (n, k) adds up to before the n states T of `inside`
+    (X,) bool are left for good. Elimination without any subtraction: what leaves a state for the
+    others is added up and not taken as 1 - P[x, x], as in `stationary`. So a 0 stays 0, and for
+    B >= 0 every entry is exact to rounding, however rarely T is left."""
+    A, B = gamma * P[np.ix_(inside, inside)], B.copy()
+    leaving = 1.0 - gamma + gamma * P[np.ix_(inside, ~inside)].sum(axis=1)
+    onward = np.empty(len(A))
+    for k in range(len(A) - 1, -1, -1):
+        onward[k] = leaving[k] + A[k, :k].sum()
+        visits = A[:k, k] / onward[k]
+        A[:k, :k] += np.outer(visits, A[k, :k])
+        leaving[:k] += visits * leaving[k]
+        B[:k] += np.outer(visits, B[k])
+    for k in range(len(A)):
+        B[k] = (B[k] + A[k, :k] @ B[:k]) / onward[k]
+    return B
+
+
 def absorption(P: np.ndarray, classes: list[Class]) -> np.ndarray:
     """(X, K) probabilities of ending in each of the K closed classes, by the state of the start:
-    B = (I - P_TT)^-1 P_TR for the transient states T, those of classes that are not closed."""
+    B = (I - P_TT)^-1 P_TR for the transient states T, those of classes that are not closed. 0 is
+    what no way leads to."""
     closed = [c for c in classes if c.closed]
     ends = np.zeros((len(P), len(closed)))
     for k, c in enumerate(closed):
         ends[c.states, k] = 1.0
-    transient = np.flatnonzero(ends.sum(axis=1) == 0.0)
-    inner = np.eye(len(transient)) - P[np.ix_(transient, transient)]
-    ends[transient] = np.linalg.solve(inner, P[transient] @ ends)
+    transient = ~ends.any(axis=1)
+    ends[transient] = _transient_sums(P, 1.0, transient, P[transient] @ ends)
     return ends
 
 
@@ -127,18 +162,22 @@ def eigenvalues(P: np.ndarray) -> np.ndarray:
 
 
 def cost_to_go(P: np.ndarray, C: np.ndarray, gamma: float, classes: list[Class]) -> CostToGo:
-    """V (X,) = (I - gamma P)^-1 C, gamma in [0, 1]; see the top for gamma = 1."""
-    if gamma < 1.0:
-        V = np.linalg.solve(np.eye(len(P)) - gamma * P, C)
-        return CostToGo(V, np.ones(len(P), bool))
-    closed = [c for c in classes if c.closed]
-    costly = np.array([bool(C[c.states].any()) for c in closed])
-    finite = absorption(P, classes)[:, costly].sum(axis=1) == 0.0
-    ended = np.isin(np.arange(len(P)), np.concatenate([c.states for c in closed]))
-    left = np.flatnonzero(finite & ~ended)
+    """V (X,) = (I - gamma P)^-1 C, gamma in [0, 1]; see the top for gamma = 1. Where C >= 0,
+    every entry is exact to rounding."""
+    finite, left = np.ones(len(P), bool), np.ones(len(P), bool)
+    if gamma == 1.0:
+        costly = np.zeros(len(P), bool)
+        for c in classes:
+            if c.closed:
+                left[c.states] = False
+                costly[c.states] = C[c.states].any()
+        finite = ~leads_to(P, costly)
+        left &= finite
     V = np.zeros(len(P))
-    V[left] = np.linalg.solve(np.eye(len(left)) - P[np.ix_(left, left)], C[left])
-    return CostToGo(V, finite)
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        V[left] = _transient_sums(P, gamma, left, C[left, None])[:, 0]
+    finite = finite & np.isfinite(V)  # there is no number for what lies beyond the largest float
+    return CostToGo(np.where(finite, V, 0.0), finite)
 
 
 def mean_costs(
@@ -175,22 +214,27 @@ def evaluate(
     P: np.ndarray, C: np.ndarray, gamma: float, V: np.ndarray, exact: CostToGo, most: int
 ) -> Iterator[Sweep]:
     """V_1, V_2, ... from V_0 = `V` (X,) by V_(k+1) = C + gamma P V_k, until V is exact to
-    TOLERANCE of its largest entry or `most` sweeps are done."""
+    TOLERANCE of its largest entry (of that of V_0, where V = 0) or `most` sweeps are done."""
     sums = bool(exact.finite.all())
     gap = float(np.abs(V - exact.V).max())
-    goal = TOLERANCE * (1.0 + float(np.abs(exact.V).max()))
+    goal = TOLERANCE * (float(np.abs(exact.V).max()) or gap)
     errors = [gap] if sums else []
     for k in range(1, most + 1):
         V, done, progress = C + gamma * (P @ V), "", k / most
         if sums:
             errors.append(float(np.abs(V - exact.V).max()))
         if sums and errors[-1] <= goal:
-            done, progress = f"V is exact to nine digits, k = {k}.", 1.0
+            done, progress = f"V is exact to nine digits of its largest entry, k = {k}.", 1.0
         elif k == most:
-            left = f"an error of {errors[-1]:.2g} is left" if sums else "V has no limit"
+            left = f"an error of {errors[-1]:.2g} is left" if sums else _without_limit(exact.finite)
             done = f"Stopped at k = {k}: {left}."
         elif sums and gap > goal:
             progress = max(progress, float(np.log(gap / errors[-1]) / np.log(gap / goal)))
         yield Sweep(V, np.array(errors), gap * gamma ** np.arange(len(errors)), done, progress)
         if done:
             return
+
+
+def _without_limit(finite: np.ndarray) -> str:
+    some = f" in {int((~finite).sum())} of {len(finite)} states" if finite.any() else ""
+    return f"V has no limit{some}"

@@ -9,7 +9,8 @@ from every state one path leads into a cycle, of states x_1, ..., x_L say, with 
     V^pi(x_1) = sum over k of gamma^k l_k / (1 - gamma^L),
 
 and back along the path V^pi(x) = l + gamma V^pi(x'). With gamma = 1 a state from which the policy
-never comes to rest at no cost has no finite cost-to-go: its value is infinite.
+never comes to rest at no cost has no finite cost-to-go: its value is infinite. Whether it comes to
+rest is decided on the graph of the chain that remains under the policy, as in `markov_chain`.
 """
 
 from collections.abc import Iterator
@@ -17,6 +18,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from labs.algorithms.bellman import Sweep, converged, policy_backup, until_done
+from labs.algorithms.markov_chain import communicating_classes, cost_to_go
 from labs.compiled import compiled
 from labs.problems.finite_mdp import FiniteMDP
 
@@ -29,7 +31,7 @@ def init(V: np.ndarray, policy: np.ndarray) -> Sweep:
 def step(mdp: FiniteMDP, at: Sweep, tolerance: float) -> Sweep:
     """One sweep of T^pi over all states."""
     V, change, backups = policy_backup(mdp, at.V, at.policy)
-    done = converged(mdp, change, tolerance)
+    done = converged(mdp, V, change, tolerance)
     return Sweep(V, at.policy, at.count + 1, at.backups + backups, change, at.held + 1, done)
 
 
@@ -48,28 +50,8 @@ def exact(mdp: FiniteMDP, policy: np.ndarray) -> np.ndarray:
     matrix, cost = mdp.transition_matrix(policy), mdp.policy_cost(policy)
     if mdp.gamma < 1.0:
         return np.asarray(np.linalg.solve(np.eye(mdp.X) - mdp.gamma * matrix, cost))
-    ends = _ends_surely(matrix, mdp.terminal)
-    V = np.where(mdp.terminal, 0.0, np.inf)
-    on = np.ix_(ends, ends)
-    V[ends] = np.linalg.solve(np.eye(int(ends.sum())) - matrix[on], cost[ends])
-    return V
-
-
-def _ends_surely(matrix: np.ndarray, terminal: np.ndarray) -> np.ndarray:
-    """(X,) bool: the states, not terminal, from which the chain ends with probability 1: they
-    lead to none from where no terminal state can be reached."""
-    lost = ~_leads_to(matrix, terminal)
-    return np.asarray(~_leads_to(matrix, lost) & ~terminal)
-
-
-def _leads_to(matrix: np.ndarray, goal: np.ndarray) -> np.ndarray:
-    """(X,) bool: from where the chain may come into `goal`, those in it included."""
-    found = goal
-    while True:
-        more = found | (matrix @ found > 0.0)
-        if (more == found).all():
-            return found
-        found = more
+    found = cost_to_go(matrix, cost, mdp.gamma, communicating_classes(matrix))
+    return np.where(found.finite, found.V, np.inf)
 
 
 @compiled
@@ -96,8 +78,10 @@ def _follow_to_the_end(cost: np.ndarray, ahead: np.ndarray, gamma: float, V: np.
                     break
             if idle:
                 V[x] = 0.0
+            elif gamma < 1.0:
+                V[x] = total / (1.0 - weight)
             else:
-                V[x] = total / (1.0 - weight) if gamma < 1.0 else total * np.inf
+                V[x] = -np.inf if total < 0.0 else np.inf
             mark[x] = known
         while length:
             length -= 1

@@ -39,7 +39,7 @@ def step(mdp: FiniteMDP, at: Sweep, m: float, tolerance: float) -> Sweep:
     if at.held == 0:
         V, policy, change = optimal_backup(mdp, at.V, at.policy)
         held = 1 if m > 1 else 0
-        backups, done = mdp.X * mdp.U, converged(mdp, change, tolerance)
+        backups, done = mdp.X * mdp.U, converged(mdp, V, change, tolerance)
     else:
         V, change, backups = policy_backup(mdp, at.V, at.policy)
         policy, done = at.policy, ""

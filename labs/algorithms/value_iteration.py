@@ -23,7 +23,7 @@ def init(V: np.ndarray) -> Sweep:
 def step(mdp: FiniteMDP, at: Sweep, tolerance: float) -> Sweep:
     """One sweep of T over all states."""
     V, policy, change = optimal_backup(mdp, at.V, at.policy)
-    done = converged(mdp, change, tolerance)
+    done = converged(mdp, V, change, tolerance)
     return Sweep(V, policy, at.count + 1, at.backups + mdp.X * mdp.U, change, 0, done)
 
 

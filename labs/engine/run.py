@@ -18,7 +18,7 @@ from labs.engine.snapshots import Snapshots
 from labs.engine.solution import Solution
 from labs.errors import LabError, ParameterError
 from labs.lab import Inputs, Snapshot
-from labs.plots import Readout
+from labs.plots import measured
 from labs.scene import NullScene
 
 MAX_EVENTS = 20_000
@@ -104,7 +104,7 @@ class World:
             # Says that the events tell how far the solver went, even if it goes nowhere.
             self._note(Event(0, "solve", "iterate", 0))
         first = self.lab.measure(self.params, self.state)
-        scalars = [p.channel for p in self.lab.plots if isinstance(p, Readout)]
+        scalars = [name for plot in self.lab.plots for name in measured(plot)]
         self.recorder = Recorder(first, scalars, self._capacity)
         self.recorder.add(self.t, first)
 

@@ -104,7 +104,7 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
             "steps to go N - i",
             "V of the start",
             Trace("stages", "stage_values", "finite horizon", "marked", 1),
-            Trace("stages", "stationary", "infinite horizon", "dash"),
+            Trace("ends", "stationary", "infinite horizon", "dash"),
             Trace("stage", "stage_value", "shown", "points", 2),
         ),
         TimeSeries(
@@ -123,6 +123,7 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
             "column; angle from upright [rad]",
             "row from below; velocity [rad/s]",
             "V",
+            gaps=True,
         ),
         HeatMap(
             "Policy",
@@ -132,6 +133,7 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
             "column; angle from upright [rad]",
             "row from below; velocity [rad/s]",
             "control, from 0; torque [N·m]",
+            gaps=True,
         ),
         Curves(
             "States of a table by joints",
@@ -250,32 +252,27 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         self, params: DynamicProgrammingParams, state: DynamicProgrammingState
     ) -> Measurement:
         found, walk, at = problem(state.problem), state.walk, state.standing
-        mdp, row = found.mdp, params.row
-        V, _ = _shown(params, state)
+        (V, _), mdp, row = _shown(params, state), found.mdp, params.row
         if params.shown == "finite":
             left = max(int(params.to_go) - walk.steps, 0)
             V = finite_horizon(state.problem, params.w_f)[0][left]
-        promised = walk.paid + mdp.gamma**walk.steps * float(V[state_of(found, walk.to)])
-        swings = params.world == "pendulum"
-        turning = swings and walk.steps > 0 and not walk.resting
         states = table_size(int(params.joints), int(params.cuts))
         measured: dict[str, float | np.ndarray] = {
             "paid": walk.paid,
-            "promised": promised,
-            "angle": float(walk.at[0] % (2 * np.pi) - np.pi) if swings else 0.0,
-            "torque": float(found.efforts[walk.u]) if turning else 0.0,
+            "promised": walk.paid + mdp.gamma**walk.steps * float(V[state_of(found, walk.to)]),
             "at_start": float(_shown(params, state)[0][found.start]),
             "entries": float(mdp.X * mdp.U),
             "states": float(states),
             "memory": 8e-9 * states,
         }
+        if params.world == "pendulum":
+            turning = walk.steps > 0 and not walk.resting
+            measured["angle"] = float(walk.at[0] % (2 * np.pi) - np.pi)
+            measured["torque"] = float(found.efforts[walk.u]) if turning else 0.0
         if params.shown != "finite":
-            measured |= {
-                "sweeps": float(at.count[row]),
-                "backups": float(at.backups[-1, row]),
-                "error": float(at.errors[-1, row]),
-            }
-        return measured
+            measured |= {"sweeps": float(at.count[row]), "backups": float(at.backups[-1, row])}
+            measured["error"] = float(at.errors[-1, row]) if at.begun[row] else np.nan
+        return {name: value for name, value in measured.items() if not np.isnan(value)}
 
     def fields(
         self, params: DynamicProgrammingParams, state: DynamicProgrammingState
@@ -288,7 +285,7 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         if isinstance(found.place, GridWorld):
             rows, columns = found.place.shape
             across, up = np.arange(1.0, columns + 1), np.arange(1.0, rows + 1)
-            values, control = (found.place.on_map(x)[::-1] for x in (V, controls))
+            values, control = (found.place.on_map(x, np.nan)[::-1] for x in (V, controls))
         else:
             every = -(-found.place.q_nodes // PIXELS)
             across, up = found.place.angles[::every], found.place.velocities[::every]
@@ -297,7 +294,8 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         return curves(state.standing, found.mdp.gamma, POINTS) | {
             "stages": np.arange(HORIZON + 1.0),
             "stage_values": stages[:, found.start],
-            "stationary": np.full(HORIZON + 1, best if np.isfinite(best) else 0.0),
+            "ends": np.array([0.0, HORIZON] if np.isfinite(best) else []),
+            "stationary": np.array([best, best] if np.isfinite(best) else []),
             "stage": np.array([float(int(params.to_go))]),
             "stage_value": stages[int(params.to_go), found.start : found.start + 1],
             "across": across,
@@ -340,9 +338,11 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
 def _shown(
     params: DynamicProgrammingParams, state: DynamicProgrammingState
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """The values (X,) and the policy (X,) shown; None where no time is left."""
+    """The values (X,) and the policy (X,) shown: NaN where the iteration is not begun, None where
+    no time is left."""
     if params.shown != "finite":
-        return state.standing.V[params.row], state.standing.policy[params.row]
+        at, row = state.standing, params.row
+        return at.V[row] if at.begun[row] else np.full_like(at.V[row], np.nan), at.policy[row]
     values, policies = finite_horizon(state.problem, params.w_f)
     left = int(params.to_go)
     return values[left], policies[left - 1] if left else None

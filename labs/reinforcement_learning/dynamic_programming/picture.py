@@ -14,6 +14,8 @@ from labs.tasks.grid_world.map import GridWorld
 from labs.tasks.pendulum_table.table import PendulumGrid
 
 WALL, CLIFF, GOAL = (0.36, 0.38, 0.42), (0.62, 0.16, 0.16), (0.30, 0.62, 0.32)
+NO_VALUE = (0.62, 0.63, 0.65)
+"""Of cells and nodes without one."""
 HEIGHT = 0.55
 """[m] of the relief at the largest value."""
 ALONG, ACROSS = 2.6, 1.9
@@ -34,7 +36,7 @@ class Picture:
 
     found: Problem
     V: np.ndarray
-    """(X,)."""
+    """(X,); NaN where there is no value."""
     top: float
     """The value that stands HEIGHT tall, > 0."""
     policy: np.ndarray | None
@@ -91,6 +93,7 @@ def draw_pendulum(scene: Scene, picture: Picture, grid: PendulumGrid, walk: Walk
     points = _place(grid, grid.nodes.reshape(*grid.shape, 2)[some])
     points[..., 2] += heights[some]
     colors = sequential(heights[some], 0.0, HEIGHT)
+    colors[np.isnan(picture.V.reshape(grid.shape)[some])] = NO_VALUE
     scene.surface("relief", points, colors)
     _flow_arrows(scene, picture, grid, heights)
     turns = np.abs(np.diff(walk.path[:, 0] // (2 * np.pi), append=walk.path[-1, 0] // (2 * np.pi)))
@@ -119,6 +122,7 @@ def draw_pendulum(scene: Scene, picture: Picture, grid: PendulumGrid, walk: Walk
 def _cell_colors(picture: Picture, world: GridWorld, *, goals: bool) -> np.ndarray:
     """(rows, columns, 3): by value; walls grey, the cliff red and, if `goals`, those green."""
     colors = sequential(_laid(picture, world), 0.0, HEIGHT)
+    colors[tuple(world.cells[np.isnan(picture.V)].T)] = NO_VALUE
     signs = np.array([list(row) for row in world.rows])
     for sign, color in {"#": WALL, "C": CLIFF, **({"G": GOAL} if goals else {})}.items():
         colors[signs == sign] = color
@@ -126,8 +130,8 @@ def _cell_colors(picture: Picture, world: GridWorld, *, goals: bool) -> np.ndarr
 
 
 def _heights(picture: Picture) -> np.ndarray:
-    """(X,) [m]: in proportion to the values."""
-    return np.asarray(np.clip(picture.V / picture.top, -0.2, 1.3) * HEIGHT)
+    """(X,) [m]: in proportion to the values; flat where there are none."""
+    return np.asarray(np.clip(np.nan_to_num(picture.V) / picture.top, -0.2, 1.3) * HEIGHT)
 
 
 def _laid(picture: Picture, world: GridWorld) -> np.ndarray:

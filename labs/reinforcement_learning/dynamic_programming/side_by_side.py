@@ -18,8 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from labs.algorithms import policy_evaluation, policy_iteration, value_iteration
-from labs.algorithms.bellman import Sweep
+from labs.algorithms.bellman import NO_BOUND, Sweep
 from labs.problems.finite_mdp import FiniteMDP, random_policy
+from labs.rounding import rounded_up
 
 METHODS = {
     "evaluation": "Policy evaluation",
@@ -79,7 +80,8 @@ class Standing:
 
     @property
     def verdict(self) -> str:
-        """In a sentence once all are done, else empty: whether all have converged."""
+        """In a sentence once all are done, else empty: whether all have converged, and how near
+        they came to their limits, which are known."""
         if not self.over:
             return ""
         short = [
@@ -87,7 +89,17 @@ class Standing:
             for name, done in zip(METHODS.values(), self.done, strict=True)
             if done.startswith(FAILED)
         ]
-        return " ".join(short) or "All four iterations have converged."
+        if short:
+            return " ".join(short)
+        left = f"the largest distance left is {rounded_up(self.errors[-1].max())}."
+        if any(NO_BOUND in done for done in self.done):
+            return f"All four iterations have stopped; {NO_BOUND}: {left}"
+        return f"All four iterations have converged: {left}"
+
+    @property
+    def begun(self) -> np.ndarray:
+        """(4,) bool: which of them have values to show for it, before or after the first sweep."""
+        return np.array([not done.startswith(NOT_BEGUN) for done in self.done])
 
 
 def start(mdp: FiniteMDP, V: np.ndarray, policy: np.ndarray, limits: np.ndarray) -> Standing:
@@ -215,11 +227,13 @@ def _endless(mdp: FiniteMDP, limit: np.ndarray, why: str = "") -> str:
 
 def curves(at: Standing, gamma: float, most: int) -> dict[str, np.ndarray]:
     """For each method its distance to the limit ("error_...") over sweeps ("sweep_...") and over
-    backups ("backups_..."), at `most` places at most; and the bound gamma^k |V_0 - V*|."""
+    backups ("backups_..."), at `most` places at most and none where it is not begun; and the bound
+    gamma^k |V_0 - V*|."""
     found = {}
     for i, method in enumerate(METHODS):
         last = int(at.count[i])
         places = np.unique(np.rint(np.linspace(0, last, min(last + 1, most))).astype(int))
+        places = places[: len(places) * at.begun[i]]
         found[f"sweep_{method}"] = places.astype(float)
         found[f"error_{method}"] = np.maximum(at.errors[places, i], LEAST)
         found[f"backups_{method}"] = at.backups[places, i].astype(float)

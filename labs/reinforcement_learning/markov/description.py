@@ -2,11 +2,16 @@
 
 import numpy as np
 
-from labs.algorithms.markov_chain import Class, is_irreducible
+from labs.algorithms.markov_chain import Class, is_irreducible, leads_to
 from labs.reinforcement_learning.markov.reward_process import RewardProcess
+from labs.rounding import rounded_up
 
 TIE = 1e-9
-"""Costs that differ by less are equal."""
+"""Values that differ by less are equal, relative to the largest of them and of the costs."""
+ROUNDING = 1e-15
+"""Of an eigenvalue near 1."""
+CANCELLED = 1e-12
+"""A mean cost is 0 if it is smaller than this, relative to the mean of its magnitudes."""
 
 
 def about_chain(process: RewardProcess, source: int, target: int) -> str:
@@ -45,8 +50,8 @@ def value(process: RewardProcess, gamma: float) -> str:
         return "γ = 0, myopic: V = C, the next cost is all that counts."
     if gamma < 1.0:
         return (
-            f"γ = {gamma:g} looks about 1/(1 − γ) = {1.0 / (1.0 - gamma):.3g} steps ahead. The "
-            f"eigenvalues of γP stay within {gamma:g}, so I − γP is regular: V is unique."
+            f"γ = {gamma} looks about 1/(1 − γ) = {1.0 / (1.0 - gamma):.3g} steps ahead. The "
+            f"eigenvalues of γP stay within {gamma}, so I − γP is regular: V is unique."
         )
     names, found = process.table.states, process.cost_to_go(gamma)
     closed = [c for c in process.classes if c.closed]
@@ -57,20 +62,38 @@ def value(process: RewardProcess, gamma: float) -> str:
             f"{singular}V exists all the same: the chain is sure to end in {ends}, for nothing. "
             "Put V = 0 there, and the system of the other states is regular."
         )
-    lost = np.flatnonzero(~found.finite)
-    mean = process.far @ process.C  # of a step in the long run
-    rates = sorted({round(float(rate), 3) + 0.0 for rate in mean[lost]})
-    which = "every state" if len(lost) == len(names) else _names(names, lost)
-    if rates == [0.0]:
-        return (
-            f"{singular}From {which} costs come and go for ever. Their mean is 0, so that V = C + "
-            "P V has infinitely many solutions, and the sum of costs need not settle. Take γ < 1."
+    return f"{singular}{_unending(process, found.finite)} Take γ < 1."
+
+
+def _unending(process: RewardProcess, finite: np.ndarray) -> str:
+    """From where costs go on for ever, from where they may, and from where they do not (`finite`):
+    a matter of which states lead to which."""
+    names, P = process.table.states, process.P
+    free = leads_to(P, finite)
+    never, may, sure = np.flatnonzero(~free), np.flatnonzero(free & ~finite), np.flatnonzero(finite)
+    mean, size = process.far @ process.C, process.far @ np.abs(process.C)  # of a step, long run
+    mean[np.abs(mean) <= CANCELLED * size] = 0.0
+    which = "every state" if len(never) == len(names) else _names(names, never)
+    stays = np.concatenate([c.states for c in process.classes if c.closed])
+    if not mean[stays].any():
+        said = (
+            f"From {which} costs come and go for ever. Their mean is 0, so that V = C + P V has "
+            "infinitely many solutions, and the sum of costs need not settle."
         )
-    grows = " to ".join(_number(rate) for rate in sorted({rates[0], rates[-1]}))
-    return (
-        f"{singular}From {which} the chain never ends, and in the long run a step costs {grows} "
-        "on average: the sum of costs has no finite value. Take γ < 1."
-    )
+    else:
+        rates = sorted(mean[never])
+        grows = " to ".join(dict.fromkeys(_number(rate) for rate in (rates[0], rates[-1])))
+        said = (
+            f"From {which} the chain never ends, and in the long run a step costs {grows} on "
+            "average: the sum of costs has no finite value."
+        )
+    if len(may):
+        said += f" From {_names(names, may)} it may end or come to that: no finite value either."
+    if len(sure):
+        ends = _names(names, stays[finite[stays]])
+        said += f" From {_names(names, sure)} V exists: the chain is sure to end in {ends}, for "
+        said += "nothing."
+    return said
 
 
 def controls(process: RewardProcess, gamma: float) -> str:
@@ -81,7 +104,8 @@ def controls(process: RewardProcess, gamma: float) -> str:
         return ""
     Q = process.action_values(gamma, found.V)
     best = Q.argmin(axis=1)
-    wins = np.flatnonzero(Q.min(axis=1) < found.V - TIE * (1.0 + np.abs(found.V)))
+    tie = TIE * (np.abs(table.C).max() + np.abs(found.V).max())
+    wins = np.flatnonzero(Q.min(axis=1) < found.V - tie)
     if not len(wins):
         return "No control is better than this policy: V = min Q in every state."
     told = [
@@ -120,9 +144,10 @@ def _one_end(names: tuple[str, ...], modes: np.ndarray, end: Class) -> str:
     if len(magnitudes) == 1:
         speed = "and there is no other"
     elif second < 1e-6:
-        speed = "all others are 0: the start is soon forgotten altogether"
+        speed = "all others are 0 to six digits: the start is soon forgotten altogether"
     elif second > 0.999:
-        speed = f"the next has magnitude {second:.4f}: the start is forgotten very slowly"
+        short = rounded_up(max(1.0 - second, ROUNDING))
+        speed = f"the next is within {short} of 1: the start is forgotten very slowly"
     else:
         half = np.log(0.5) / np.log(second)
         speed = f"the next has magnitude {second:.3f}: what is left of the start halves " + (

@@ -150,7 +150,7 @@ class Markov(Lab[MarkovParams, MarkovState]):
         ),
         Matrix("Transition matrix", "P", "P", shade=True),
         Note("The value in words", "value"),
-        Bars("Cost-to-go by iteration, and exact", "V", r"V_k", "", marks="exact"),
+        Bars("Cost-to-go by iteration, and exact", "V", r"V_k", "", marks="exact", gaps=True),
         Curves(
             "Error of the iteration",
             "iteration k",
@@ -234,12 +234,11 @@ class Markov(Lab[MarkovParams, MarkovState]):
             "steps": float(walk.steps),
             "off": 50.0 * float(np.abs(walk.mu - far).sum()),
             "visits_off": 50.0 * float(np.abs(visited - far).sum()),
-            "second": float(np.abs(np.append(process.eigenvalues, 0.0)[1])),
             "step_cost": float(far @ process.C),
         }
-        if x < len(process.P) and found.finite[x]:
-            measured["value"] = float(found.V[x])
-        return measured
+        known = {"second": np.abs(process.eigenvalues[1:2]), "value": found.known[x : x + 1]}
+        known = {name: value for name, value in known.items() if np.isfinite(value).any()}
+        return measured | {name: float(value[0]) for name, value in known.items()}
 
     def fields(self, params: MarkovParams, state: MarkovState) -> Mapping[str, np.ndarray]:
         process, last = params.process, len(params.process.P) - 1
@@ -254,7 +253,7 @@ class Markov(Lab[MarkovParams, MarkovState]):
             "im": process.eigenvalues.imag,
             "P": process.P,
             "V": state.V,
-            "exact": found.V if found.finite.all() else np.zeros(0),
+            "exact": found.known,
             "sweep": np.arange(len(state.errors), dtype=float),
             "error": state.errors,
             "bound": state.bounds,

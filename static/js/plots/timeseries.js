@@ -115,7 +115,7 @@ export class TimeSeries {
     const [a, b] = run.span(from, to);
     const stride = Math.max(1, Math.floor((b - a) / (DENSITY * u.width)));
     const data = ["t", ...this.curves.map((curve) => curve.column)].map((name) =>
-      thin(run.column(name), a, b, stride));
+      holed(thin(run.column(name), a, b, stride)));
     u.batch(() => {
       u.setData(data, false);
       u.setScale("x", { min: from, max: to });
@@ -320,6 +320,11 @@ function thin(samples, a, b, stride) {
   for (let i = first; i < b; i += stride) kept.push(samples[i]);
   if (b > a) kept.push(samples[b - 1]);
   return kept;
+}
+
+// What has no value is null to uPlot, which leaves a gap there.
+function holed(samples) {
+  return samples.some(Number.isNaN) ? Array.from(samples, (value) => (Number.isNaN(value) ? null : value)) : samples;
 }
 
 function tick(value) {

@@ -2,7 +2,7 @@
 
 One step multiplies x by the stability function of z = h lambda,
 
-    R(z) = P(z) / Q(z) = det(I - z (A - 1 b^T)) / det(I - z A)
+    R(z) = P(z) / Q(z) = det(I - z (A - 1 b^T)) / det(I - z A) = 1 + z b^T (I - z A)^-1 1
 
 a polynomial for an explicit method (Q = 1). The error stays bounded where |R(z)| <= 1: the
 region of absolute stability. A linear system x' = L x is stable under the method when h lambda
@@ -18,7 +18,8 @@ import numpy as np
 from labs.algorithms.runge_kutta import Tableau
 
 ROUNDING = 1e-12
-"""Coefficients of order one that are smaller than this are zero."""
+"""A sum whose terms cancel to less than this share of their sizes is zero. Never less than a
+fixed number: the last coefficient of a method of many stages is small and decides its limit."""
 GROWTH = 1e-7
 """A step that makes the state longer by more than this is seen as unstable."""
 
@@ -32,11 +33,13 @@ class StabilityFunction:
 
     @classmethod
     def of(cls, tableau: Tableau) -> "StabilityFunction":
-        ones = np.ones(tableau.stages)
-        return cls(
-            reversed_characteristic(tableau.a - np.outer(ones, tableau.b)),
-            reversed_characteristic(tableau.a),
-        )
+        """P is the product of Q and the series R = 1 + sum_k (b^T A^(k-1) 1) z^k, up to z^q. For
+        an explicit method Q = 1, and nothing cancels."""
+        q = reversed_characteristic(tableau.a)
+        powers = tableau.stages + 1
+        p = np.convolve(q, _series(tableau.a, tableau.b))[:powers]
+        sizes = np.convolve(np.abs(q), _series(np.abs(tableau.a), np.abs(tableau.b)))[:powers]
+        return cls(_without_rounding(p, sizes), q)
 
     def __call__(self, z: np.ndarray) -> np.ndarray:
         """R at complex z of any shape."""
@@ -51,23 +54,23 @@ class StabilityFunction:
 
 
 def reversed_characteristic(m: np.ndarray) -> np.ndarray:
-    """Coefficients of det(I - z M) in 1, z, ..., z^n, by Faddeev and LeVerrier: exact for the
-    nilpotent A of explicit methods, where eigenvalues would lose half of the digits."""
+    """Coefficients of det(I - z M) in 1, z, ..., z^n from Newton's identities,
+    k c_k = -sum_(j<=k) tr(M^j) c_(k-j): exact for the nilpotent A of explicit methods, where
+    eigenvalues would lose half of the digits."""
     n = len(m)
-    coefficients, power = [1.0], np.eye(n)
+    powers = [np.linalg.matrix_power(m, k) for k in range(1, n + 1)]
+    sizes = [np.linalg.matrix_power(np.abs(m), k) for k in range(1, n + 1)]
+    coefficients, largest = np.eye(n + 1)[0], np.eye(n + 1)[0]
     for k in range(1, n + 1):
-        product = m @ power
-        coefficients.append(-float(np.trace(product)) / k)
-        power = product + coefficients[-1] * np.eye(n)
-    found = np.array(coefficients)
-    found[np.abs(found) < ROUNDING] = 0.0
-    return np.trim_zeros(found, "b")
+        coefficients[k] = -sum(np.trace(powers[j - 1]) * coefficients[k - j] for j in _to(k)) / k
+        largest[k] = sum(np.trace(sizes[j - 1]) * largest[k - j] for j in _to(k)) / k
+    return _without_rounding(coefficients, largest)
 
 
 def largest_step(r: StabilityFunction, eigenvalues: np.ndarray) -> float:
     """The largest h [s] up to which |R(h lambda)| <= 1 for all eigenvalues (m,) [1/s], from the
     zeros of |P|^2 - |Q|^2 on the ray through lambda; infinite when there is no limit, 0 when
-    every step is too long."""
+    every step is too long, however little it adds."""
     return min((_along(r, value) for value in eigenvalues if abs(value) > 0.0), default=np.inf)
 
 
@@ -109,32 +112,63 @@ def measured_limit(growth: Callable[[float], float], lowest: float, highest: flo
     return 0.5 * (low + high)
 
 
-def spectral_radius(step: Callable[[np.ndarray], np.ndarray], n: int, small: float) -> float:
-    """Of the derivative of a step (n,) -> (n,) at its fixed point 0, by central differences."""
-    directions = small * np.eye(n)
-    columns = [(step(d) - step(-d)) / (2.0 * small) for d in directions]
-    derivative = np.array(columns)
-    if not np.isfinite(derivative).all():
-        return np.inf
-    return float(np.abs(np.linalg.eigvals(derivative)).max())
-
-
 def _along(r: StabilityFunction, eigenvalue: complex) -> float:
-    """The largest h on one ray."""
-    direction = eigenvalue / abs(eigenvalue)
-    excess = np.polynomial.polynomial.polysub(_squared(r.p, direction), _squared(r.q, direction))
-    excess[np.abs(excess) < ROUNDING] = 0.0
-    excess = np.trim_zeros(excess, "b")
+    """The largest h on one ray, s = h |lambda|: where excess(s) = |P|^2 - |Q|^2 first becomes
+    positive. Between two zeros it has one sign; where it only touches zero, rounding may part
+    the double one, and what lies between is no more than rounding."""
+    excess, sizes = _excess(r, eigenvalue / abs(eigenvalue))
     if len(excess) == 0:
         return np.inf  # |R| = 1 all along
-    roots = np.polynomial.polynomial.polyroots(excess)
-    real = roots[np.abs(roots.imag) < 1e-6 * (1.0 + np.abs(roots))].real
-    edges = [0.0, *sorted(value for value in real if value > 1e-9)]
-    beyond = edges[-1] + 1.0
-    for low, high in zip(edges, [*edges[1:], beyond], strict=True):
-        if np.polynomial.polynomial.polyval(0.5 * (low + high), excess) > 0.0:
+    evaluate = np.polynomial.polynomial.polyval
+    edges = [0.0, *_positive_zeros(excess)]
+    for low, high in zip(edges, [*edges[1:], 2.0 * edges[-1] + 1.0], strict=True):
+        middle = 0.5 * (low + high)
+        if evaluate(middle, excess) > ROUNDING * evaluate(middle, sizes):
             return float(low / abs(eigenvalue))
     return np.inf
+
+
+def _excess(r: StabilityFunction, direction: complex) -> tuple[np.ndarray, np.ndarray]:
+    """|P|^2 - |Q|^2 as a polynomial in s > 0 without its zeros at s = 0, trimmed, and the sizes of
+    what its coefficients are sums of."""
+    subtract, add = np.polynomial.polynomial.polysub, np.polynomial.polynomial.polyadd
+    excess = subtract(_squared(r.p, direction), _squared(r.q, direction))
+    sizes = add(_squared(np.abs(r.p), 1.0), _squared(np.abs(r.q), 1.0))
+    excess = _without_rounding(np.pad(excess, (0, len(sizes) - len(excess))), sizes)
+    lowest = int(np.argmax(excess != 0.0)) if len(excess) else 0
+    return excess[lowest:], sizes[lowest : len(excess)]
+
+
+def _positive_zeros(polynomial: np.ndarray) -> list[float]:
+    """Real zeros s > 0 in order, of coefficients (k,) of 1, s, ... whose first and last are not
+    zero. They are looked for in s / unit, so that no coefficient is lost beside another."""
+    degree = len(polynomial) - 1
+    if degree < 1:
+        return []
+    unit = abs(polynomial[0] / polynomial[-1]) ** (1.0 / degree)
+    scaled = polynomial * unit ** np.arange(degree + 1.0)
+    roots = np.polynomial.polynomial.polyroots(scaled / np.abs(scaled).max())
+    real = roots[np.abs(roots.imag) < 1e-6 * np.abs(roots)].real
+    return sorted(float(unit * value) for value in real if value > 0.0)
+
+
+def _series(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(q + 1,) coefficients of 1 + z b^T (I - z A)^-1 1 up to z^q."""
+    coefficients, stages = [1.0], np.ones(len(b))
+    for _ in range(len(b)):
+        coefficients.append(float(b @ stages))
+        stages = a @ stages
+    return np.array(coefficients)
+
+
+def _without_rounding(sums: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Coefficients (k,), those zero that are rounding beside the sizes (k,) of their terms,
+    without zeros at the end."""
+    return np.trim_zeros(np.where(np.abs(sums) > ROUNDING * sizes, sums, 0.0), "b")
+
+
+def _to(k: int) -> range:
+    return range(1, k + 1)
 
 
 def _squared(coefficients: np.ndarray, direction: complex) -> np.ndarray:

@@ -9,7 +9,8 @@ axes, the geometric Jacobian has one column a joint:
 so that (p_e', omega) = J(q) q'. The notes' (1.2) mixes the two cases.
 
 With the orientation as roll-pitch-yaw angles phi_o = (zeta, theta, psi), R = Rz(psi) Ry(theta)
-Rx(zeta), the angular velocity is omega = T(phi_o) phi_o' and the analytical Jacobian is
+Rx(zeta), the angular velocity is omega = T(phi_o) phi_o', the columns of T the axes of the three
+(`orientation.euler_axes`), and the analytical Jacobian is
 
     J_A = d phi / d q = (J_p, T^-1 J_o),    det T = cos theta.
 """
@@ -18,6 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+
+from labs.algorithms.orientation import matrix_to_rpy
 
 SMALLEST_COS = 1e-6
 """T is not inverted nearer to its singularity than this cos(theta)."""
@@ -100,41 +103,20 @@ def geometric_rate(chain: Chain, v: np.ndarray) -> np.ndarray:
     return np.concatenate([turning * swing + sliding * axes, turning * axes], axis=1).T
 
 
-def roll_pitch_yaw(rotation: np.ndarray) -> np.ndarray:
-    """(zeta, theta, psi) [rad] of R (3, 3) = Rz(psi) Ry(theta) Rx(zeta), |theta| <= pi/2."""
-    r = rotation
-    return np.array(
-        [
-            np.arctan2(r[2, 1], r[2, 2]),
-            np.arctan2(-r[2, 0], np.hypot(r[0, 0], r[1, 0])),
-            np.arctan2(r[1, 0], r[0, 0]),
-        ]
-    )
-
-
-def rate_matrix(angles: np.ndarray) -> np.ndarray:
-    """T (3, 3): omega = T(phi_o) phi_o' for phi_o = (zeta, theta, psi) (3,) [rad]. Its columns
-    are the axes the three angles turn about, in the world's axes."""
-    _, theta, psi = angles
-    c, s = np.cos(psi), np.sin(psi)
-    return np.array(
-        [[c * np.cos(theta), -s, 0.0], [s * np.cos(theta), c, 0.0], [-np.sin(theta), 0.0, 1.0]]
-    )
-
-
 def inverse_rate_matrix(angles: np.ndarray) -> np.ndarray:
     """T^-1 (3, 3): phi_o' = T^-1 omega. It grows as 1 / cos(theta); within SMALLEST_COS of
     theta = +-pi/2, where T has no inverse, it stays at its value there and finite."""
     _, theta, psi = angles
     c, s = np.cos(psi), np.sin(psi)
-    cos = max(float(np.cos(theta)), SMALLEST_COS)
+    cos = float(np.cos(theta))
+    cos = float(np.copysign(max(abs(cos), SMALLEST_COS), cos))
     sin = np.sin(theta)
     return np.array([[c / cos, s / cos, 0.0], [-s, c, 0.0], [c * sin / cos, s * sin / cos, 1.0]])
 
 
 def analytical(chain: Chain, jacobian: np.ndarray) -> np.ndarray:
     """J_A (6, n) from the geometric J (6, n): the same linear rows, T^-1 J_o below."""
-    angles = roll_pitch_yaw(chain.placement.rotation)
+    angles = matrix_to_rpy(chain.placement.rotation)
     return np.concatenate([jacobian[:3], inverse_rate_matrix(angles) @ jacobian[3:]])
 
 

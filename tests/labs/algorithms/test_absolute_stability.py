@@ -11,9 +11,8 @@ from labs.algorithms.absolute_stability import (
     largest_step,
     measured_limit,
     reversed_characteristic,
-    spectral_radius,
 )
-from labs.algorithms.runge_kutta import TABLEAUS, Flow, parse, step
+from labs.algorithms.runge_kutta import TABLEAUS, Flow, Tableau, order, parse, step
 
 R = {name: StabilityFunction.of(tableau) for name, tableau in TABLEAUS.items()}
 
@@ -113,6 +112,76 @@ def test_the_largest_steps_are_the_published_ones(name: str, imaginary: float, r
     assert largest_step(R[name], np.array([-0.5, 0.0])) == pytest.approx(real * 2)
 
 
+CASH_KARP = parse(
+    """0 |
+    1/5  | 1/5
+    3/10 | 3/40 9/40
+    3/5  | 3/10 -9/10 6/5
+    1    | -11/54 5/2 -70/27 35/27
+    7/8  | 1631/55296 175/512 575/13824 44275/110592 253/4096
+    | 37/378 0 250/621 125/594 0 512/1771"""
+)
+
+
+def chebyshev(stages: int, damping: float) -> tuple[Tableau, float]:
+    """The tableau, one stage after the other, of the stabilised method R(z) = T_s(w0 + w1 z) /
+    T_s(w0) with w0 = 1 + damping / s^2 and R'(0) = 1; and how far |R| <= 1 goes on the negative
+    real axis: T_s stays within its value at w0 down to -w0. (Hairer, Wanner, II, IV.2.)"""
+    t = np.polynomial.Chebyshev.basis(stages)
+    w0 = 1.0 + damping / stages**2
+    w1 = t(w0) / t.deriv()(w0)
+    in_powers = t.convert(kind=np.polynomial.Polynomial)
+    p: np.ndarray = (in_powers(np.polynomial.Polynomial([w0, w1])) / t(w0)).coef
+    a = np.diag((p[2:] / p[1:-1])[::-1], -1)
+    return Tableau(a, p[1] * np.eye(stages)[-1], a.sum(axis=1)), 2.0 * w0 / w1
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.01, 0.05, 0.3])
+@pytest.mark.parametrize("stages", range(1, 7))
+def test_a_stabilised_method_keeps_the_small_coefficients_that_limit_it(
+    stages: int, damping: float
+) -> None:
+    """Without damping |R| touches 1 between and must not stop there."""
+    tableau, wanted = chebyshev(stages, damping)
+    found = largest_step(StabilityFunction.of(tableau), np.array([-0.5]))
+    assert found == pytest.approx(2.0 * wanted, rel=1e-8)
+
+
+def test_the_limit_of_six_damped_stages() -> None:
+    tableau, wanted = chebyshev(6, 0.05)
+    assert wanted == pytest.approx(69.757, abs=5e-4)
+    w0 = 1.0 + 0.05 / 36
+    t6 = np.cosh(6.0 * np.arccosh(w0))
+    last = 32.0 * (2.0 * w0 / wanted) ** 6 / t6
+    assert last < 2e-8
+    assert StabilityFunction.of(tableau).p[-1] == pytest.approx(last, rel=1e-11)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_the_limit_scales_with_time(scale: float) -> None:
+    tableau, wanted = chebyshev(6, 0.05)
+    r = StabilityFunction.of(tableau)
+    assert largest_step(r, np.array([-scale])) == pytest.approx(wanted / scale, rel=1e-8)
+
+
+def test_cash_karp_has_no_stable_step_without_friction() -> None:
+    """Order 5 in six stages: on the imaginary axis |R|^2 - 1 = 2 (1/720 - p_6) s^6 + ...; it grows
+    by 1e-7 only at s = 0.2."""
+    assert order(CASH_KARP) == 4  # "or more"
+    r = StabilityFunction.of(CASH_KARP)
+    assert r.p[5] == pytest.approx(1 / 120, rel=1e-14)
+    assert largest_step(r, np.array([5.4j, -5.4j])) == 0.0
+    s = 0.1
+    assert abs(r(np.array(1j * s))) - 1.0 == pytest.approx((1 / 720 - r.p[6]) * s**6, rel=0.01)
+    # Hardly any friction, and there is a limit.
+    assert 0.0 < largest_step(r, np.array([5.4j - 1e-6])) < 0.1
+
+
+def test_a_reducible_tableau_has_the_limit_of_what_it_reduces_to() -> None:
+    twice = parse("0 | ; 1/2 | 0 1/2; | 1 0")  # the second stage, implicit, is not used
+    assert largest_step(StabilityFunction.of(twice), np.array([-1.0])) == pytest.approx(2.0)
+
+
 def test_the_limit_of_euler_on_a_damped_oscillation() -> None:
     lam = -1.2 + 5.29j
     found = largest_step(R["euler"], np.array([lam, lam.conjugate()]))
@@ -125,7 +194,8 @@ def test_theory_and_the_limit_found_by_raising_h_agree(name: str) -> None:
     flow = linear(m)
 
     def growth(h: float) -> float:
-        return spectral_radius(lambda x: step(TABLEAUS[name], flow, x, 0.0, h).x, 2, 1e-3)
+        columns = [step(TABLEAUS[name], flow, unit, 0.0, h).x for unit in np.eye(2)]
+        return float(np.abs(np.linalg.eigvals(np.array(columns))).max())
 
     theory = largest_step(R[name], np.linalg.eigvals(m))
     assert measured_limit(growth, 1e-3, 2.0) == pytest.approx(theory, rel=1e-5)

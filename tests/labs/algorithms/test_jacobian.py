@@ -1,5 +1,6 @@
 """The Jacobians: against Pinocchio, finite differences and the two-link arm's closed form."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -15,9 +16,8 @@ from labs.algorithms.jacobian import (
     geometric,
     geometric_rate,
     inverse_rate_matrix,
-    rate_matrix,
-    roll_pitch_yaw,
 )
+from labs.algorithms.orientation import euler_axes, matrix_to_rpy, rpy_to_matrix
 from labs.models.arms import Arm, load
 
 ARMS = ("ur5", "panda", "scara", "double-pendulum")
@@ -160,22 +160,34 @@ def test_a_joint_that_slides_is_carried_around_by_those_before_it() -> None:
     np.testing.assert_allclose(found[:3, 1], 1.3 * np.array([-np.sin(0.4), np.cos(0.4), 0]))
 
 
-def test_roll_pitch_yaw_against_scipy() -> None:
-    for turn in Rotation.random(50, random_state=3):
-        yaw, pitch, roll = turn.as_euler("ZYX")
-        found = roll_pitch_yaw(turn.as_matrix())
-        np.testing.assert_allclose(found, [roll, pitch, yaw], atol=1e-13)
-
-
-def test_the_rate_matrix_against_pinocchio_and_its_inverse() -> None:
-    for angles in np.random.default_rng(2).uniform([-3, -1.5, -3], [3, 1.5, 3], (50, 3)):
+def test_the_inverse_rate_matrix_against_pinocchio_and_the_axes_of_the_angles() -> None:
+    for angles in np.random.default_rng(2).uniform([-3, -3, -3], [3, 3, 3], (50, 3)):
         expected = pin.rpy.computeRpyJacobian(angles, WORLD)
-        np.testing.assert_allclose(rate_matrix(angles), expected, atol=1e-15)
+        axes = euler_axes("zyx", angles[::-1])[:, ::-1]
+        np.testing.assert_allclose(axes, expected, atol=1e-15)
         inverse = inverse_rate_matrix(angles)
-        np.testing.assert_allclose(inverse @ rate_matrix(angles), np.eye(3), atol=1e-12)
-        assert np.linalg.det(rate_matrix(angles)) == pytest.approx(np.cos(angles[1]), abs=1e-14)
+        np.testing.assert_allclose(inverse @ axes, np.eye(3), atol=1e-11)
+        assert np.linalg.det(axes) == pytest.approx(np.cos(angles[1]), abs=1e-14)
         worst = 1 / np.sqrt(1 - abs(np.sin(angles[1])))
         assert np.linalg.norm(inverse, 2) == pytest.approx(worst, rel=1e-9)
+
+
+@pytest.mark.parametrize("pitch", [np.pi / 2, -np.pi / 2])
+def test_at_the_lock_the_analytical_jacobian_belongs_to_the_angles_of_the_rotation(
+    pitch: float,
+) -> None:
+    """Roll 0.1 and yaw 0.2 are one angle there; the angles chosen give back the same rotation, and
+    T^-1 is taken at them."""
+    rotation = rpy_to_matrix(np.array([0.1, pitch, 0.2]))
+    angles = matrix_to_rpy(rotation)
+    np.testing.assert_allclose(rpy_to_matrix(angles), rotation, atol=1e-15)
+    arm = load("ur5")
+    chain = Kinematics(arm.model, arm.tip).at(arm.home)
+    chain = replace(chain, placement=pin.SE3(rotation, chain.placement.translation))
+    jacobian = geometric(chain)
+    found = analytical(chain, jacobian)[3:]
+    np.testing.assert_array_equal(found, inverse_rate_matrix(angles) @ jacobian[3:])
+    assert np.isfinite(found).all()
 
 
 @pytest.mark.parametrize("theta", [np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-9])

@@ -7,9 +7,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from labs.algorithms.absolute_stability import StabilityFunction, largest_step
 from labs.algorithms.runge_kutta import TABLEAUS, order, parse
-from labs.appendix.integration.accuracy import COUNTS, LADDER, LONGEST
+from labs.appendix.integration.accuracy import COUNTS, LADDER, LONGEST, stepper_of
 from labs.appendix.integration.convergence import exact
 from labs.appendix.integration.lab import (
     IMPLICIT,
@@ -230,20 +229,49 @@ def test_all_orders_show(system: str, implicit: str) -> None:
         assert number(world, f"order_{name}") == pytest.approx(p, abs=0.1), name
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.5])
+CASH_KARP = (
+    "0 | ; 1/5 | 1/5; 3/10 | 3/40 9/40; 3/5 | 3/10 -9/10 6/5; 1 | -11/54 5/2 -70/27 35/27;"
+    "7/8 | 1631/55296 175/512 575/13824 44275/110592 253/4096;"
+    "| 37/378 0 250/621 125/594 0 512/1771"
+)
+
+
+def growth_of_a_step(method: str, rods: int, friction: float, h: float) -> float:
+    """The spectral radius of the derivative of the method's own step at rest, by differences."""
+    advance, small = stepper_of(method, rods, friction), 1e-4
+    columns = [
+        (advance(small * unit, 0.0, h).x - advance(-small * unit, 0.0, h).x) / (2 * small)
+        for unit in np.eye(2 * rods)
+    ]
+    return float(np.abs(np.linalg.eigvals(np.array(columns))).max())
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5, 5.0])
 @pytest.mark.parametrize("system", ["pendulum", "double-pendulum"])
-def test_limits_found_are_those_of_theory(system: str, friction: float) -> None:
-    world = solved({"system": system, "friction": friction})
-    lam = world.params.plant.eigenvalues
-    for name, found in zip(NAMES, world.state.limits, strict=True):
-        if name == "semi":
-            continue
-        tableau = parse(world.params.tableau) if name == "yours" else None
-        tableau = tableau or TABLEAUS["implicit-midpoint" if name == "implicit" else name]
-        theory = largest_step(StabilityFunction.of(tableau), lam)
-        # A limit below the shortest step tried reads 0.
-        wanted = 0.0 if theory < 0.02 else min(theory, LONGEST)
-        assert found == pytest.approx(wanted, rel=1e-4), name
+def test_the_limits_are_where_the_steps_begin_to_grow(system: str, friction: float) -> None:
+    world = solved({"system": system, "friction": friction, "tableau": CASH_KARP})
+    rods = world.params.rods
+    texts = {"yours": CASH_KARP, "implicit": "implicit-midpoint"}
+    for name, limit in zip(NAMES, world.state.limits, strict=True):
+        method = texts.get(name, name)
+        if limit == LONGEST:
+            assert growth_of_a_step(method, rods, friction, 1.99) <= 1.0 + 1e-6, name
+        elif limit > 0.0:
+            assert growth_of_a_step(method, rods, friction, 0.99 * limit) <= 1.0 + 1e-6, name
+            assert growth_of_a_step(method, rods, friction, 1.01 * limit) > 1.0 + 1e-6, name
+        else:
+            assert friction == 0.0
+            assert growth_of_a_step(method, rods, friction, 0.05) > 1.0 + 1e-8, name
+
+
+def test_no_step_of_cash_karp_is_short_enough_without_friction() -> None:
+    limits = dict(zip(NAMES, solved({"tableau": CASH_KARP}).state.limits, strict=True))
+    assert [name for name, limit in limits.items() if limit == 0.0] == [
+        "euler",
+        "midpoint",
+        "heun",
+        "yours",
+    ]
 
 
 def test_the_limit_of_semi_implicit_euler() -> None:

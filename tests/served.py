@@ -15,6 +15,9 @@ import psutil
 from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
+PATIENCE = 60.0
+"""[s] What takes longer does not come any more, however busy the machine is."""
+
 
 class Served:
     """`with Served(ORCLAB_SPARES="0") as server: server.http.get("/")`."""
@@ -24,7 +27,7 @@ class Served:
     ) -> None:
         """`wait`: until a spare is warm. `stderr`: where its complaints go."""
         self._environment = os.environ | {"ORCLAB_LABS": "tests.sample_labs"} | environment
-        self._port, self._stderr = port, stderr
+        self._port, self.stderr = port, stderr
         self.start(wait)
 
     def start(self, wait: bool = True) -> None:
@@ -33,7 +36,7 @@ class Served:
             [sys.executable, "-m", "server", "--port", str(self._port)],
             env=self._environment,
             stdout=subprocess.PIPE,
-            stderr=self._stderr,
+            stderr=self.stderr,
             text=True,
         )
         assert self.process.stdout is not None
@@ -55,9 +58,13 @@ class Served:
     def stop(self, how: signal.Signals = signal.SIGINT) -> None:
         """Ends the server with a signal and waits."""
         self.http.close()
-        if self.process.poll() is None:
+        if self.running:
             self.process.send_signal(how)
             self.process.wait(20)
+
+    @property
+    def running(self) -> bool:
+        return self.process.poll() is None
 
     def health(self) -> dict[str, Any]:
         """What /healthz says."""
@@ -124,8 +131,8 @@ class Stream:
         self.socket = socket
 
     def next(self, type: str, when: Callable[[dict[str, Any]], bool] = lambda m: True) -> Any:
-        """The next message of a type that fulfils a condition. Fails after 20 s."""
-        end = time.monotonic() + 20
+        """The next message of a type that fulfils a condition. Fails after `PATIENCE`."""
+        end = time.monotonic() + PATIENCE
         while time.monotonic() < end:
             message = json.loads(self.socket.recv(timeout=end - time.monotonic()))
             if message["type"] == type and when(message):
@@ -133,7 +140,7 @@ class Stream:
         raise AssertionError(f"no such {type} came")
 
 
-def until(true: Callable[[], bool], seconds: float = 30.0) -> None:
+def until(true: Callable[[], bool], seconds: float = PATIENCE) -> None:
     """Waits until something is true. Fails after `seconds`."""
     end = time.monotonic() + seconds
     while not true():

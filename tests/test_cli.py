@@ -1,4 +1,4 @@
-"""The `orclab` command, as a process of its own (server/cli.py)."""
+"""The `orclab` command (server/cli.py): called, and once each as a process of its own."""
 
 import csv
 import json
@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,21 @@ from labs.engine.record import versions
 from server.cli import main
 
 
-def orclab(*arguments: object, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Runs the command to its end."""
-    return subprocess.run(
+@dataclass(frozen=True)
+class Result:
+    """What the command said, and how it ended."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+Orclab = Callable[..., Result]
+
+
+def own_process(*arguments: object, **environment: str) -> Result:
+    """Runs the command to its end, in a process of its own."""
+    ended = subprocess.run(
         [sys.executable, "-m", "server", *map(str, arguments)],
         check=False,
         capture_output=True,
@@ -29,9 +42,24 @@ def orclab(*arguments: object, **environment: str) -> subprocess.CompletedProces
         timeout=120,
         env=os.environ | environment,
     )
+    return Result(ended.returncode, ended.stdout, ended.stderr)
 
 
-def the_object(result: subprocess.CompletedProcess[str]) -> dict[str, Any]:
+@pytest.fixture
+def orclab(capsys: pytest.CaptureFixture[str]) -> Orclab:
+    """Calls the command here, which spares the seconds that a new process takes."""
+
+    def call(*arguments: object) -> Result:
+        try:
+            code = main([str(argument) for argument in arguments])
+        except SystemExit as end:  # argparse's way
+            code = int(end.code or 0)
+        return Result(code, *capsys.readouterr())
+
+    return call
+
+
+def the_object(result: Result) -> dict[str, Any]:
     """The one JSON object on standard output, with nothing before or after it."""
     assert result.returncode == 0, result.stderr
     assert result.stdout.count("\n") == 1
@@ -39,7 +67,7 @@ def the_object(result: subprocess.CompletedProcess[str]) -> dict[str, Any]:
     return data
 
 
-def the_refusal(result: subprocess.CompletedProcess[str]) -> str:
+def the_refusal(result: Result) -> str:
     """The sentence on standard error with which the command refused."""
     assert result.returncode == 2, result.stderr
     assert result.stdout == ""
@@ -50,7 +78,7 @@ def the_refusal(result: subprocess.CompletedProcess[str]) -> str:
 # Listing --------------------------------------------------------------------------------------
 
 
-def test_list_has_a_line_a_lab() -> None:
+def test_list_has_a_line_a_lab(orclab: Orclab) -> None:
     result = orclab("list")
     assert result.returncode == 0
     lines = result.stdout.splitlines()
@@ -60,12 +88,12 @@ def test_list_has_a_line_a_lab() -> None:
         assert entry.lab.title in line
 
 
-def test_version_is_the_one_recordings_name() -> None:
+def test_version_is_the_one_recordings_name(orclab: Orclab) -> None:
     result = orclab("--version")
     assert (result.returncode, result.stdout.strip()) == (0, versions()["orclab"])
 
 
-def test_help_names_every_command() -> None:
+def test_help_names_every_command(orclab: Orclab) -> None:
     result = orclab("--help")
     assert result.returncode == 0
     assert all(word in result.stdout for word in ("serve", "list", "run", "--port", "--open"))
@@ -75,7 +103,7 @@ def test_help_names_every_command() -> None:
 
 
 def test_run_prints_the_final_measurements() -> None:
-    result = orclab("run", "joint-control", "--set", "kp=500", "--seconds", "0.5")
+    result = own_process("run", "joint-control", "--set", "kp=500", "--seconds", "0.5")
     data = the_object(result)
     assert (data["lab"], data["seed"], data["t"], data["trouble"]) == ("joint-control", 0, 0.5, "")
     world = run("joint-control", {"kp": 500.0}, seconds=0.5)
@@ -84,11 +112,11 @@ def test_run_prints_the_final_measurements() -> None:
     assert result.stderr == ""
 
 
-def test_the_default_is_ten_seconds() -> None:
+def test_the_default_is_ten_seconds(orclab: Orclab) -> None:
     assert the_object(orclab("run", "oscillator"))["t"] == 10.0
 
 
-def test_changes_presses_and_drags_happen_at_their_times() -> None:
+def test_changes_presses_and_drags_happen_at_their_times(orclab: Orclab) -> None:
     line = (
         "run oscillator --seconds 1 --set noisy=false --at 0.2 omega=5 --at 0.3 press=kick "
         "--at 0.4 hold=pull:0.5,0,0 --at 0.5 guess=16"
@@ -99,7 +127,7 @@ def test_changes_presses_and_drags_happen_at_their_times() -> None:
     assert data["x"] == pytest.approx(np.cos(5.0), rel=1e-12)
 
 
-def test_trouble_is_a_result_and_a_sentence() -> None:
+def test_trouble_is_a_result_and_a_sentence(orclab: Orclab) -> None:
     result = orclab("run", "troublesome", "--set", "fault=trouble")
     data = the_object(result)
     assert data["trouble"] == "It diverged at once: choose another fault."
@@ -107,13 +135,13 @@ def test_trouble_is_a_result_and_a_sentence() -> None:
     assert data["t"] == 0.01
 
 
-def test_a_diverged_arm_prints_finite_numbers_only() -> None:
+def test_a_diverged_arm_prints_finite_numbers_only(orclab: Orclab) -> None:
     line = "run joint-control --set kd=0 --set integrator=explicit-euler --set kp=2000"
     data = the_object(orclab(*line.split(), "--set", "torque_limits=off"))
     assert data["trouble"].startswith("Diverged at t = ")
 
 
-def test_the_three_forms_hold_the_same_run(tmp_path: Path) -> None:
+def test_the_three_forms_hold_the_same_run(orclab: Orclab, tmp_path: Path) -> None:
     for form in ("json", "csv", "npz"):
         path = tmp_path / f"run.{form}"
         line = "run oscillator --seconds 1 --seed 3 --set noisy=true"
@@ -132,18 +160,18 @@ def test_the_three_forms_hold_the_same_run(tmp_path: Path) -> None:
     assert len(column) == 101
 
 
-def test_the_same_seed_gives_the_same_channels(tmp_path: Path) -> None:
+def test_the_same_seed_gives_the_same_channels(orclab: Orclab, tmp_path: Path) -> None:
     contents = []
-    for seed, name in ((3, "one"), (3, "two"), (4, "other")):
+    for seed, name, command in ((3, "one", orclab), (3, "two", own_process), (4, "other", orclab)):
         path = tmp_path / f"{name}.npz"
         line = f"run joint-control --set noise=0.01 --seconds 0.5 --seed {seed} --at 0.2 press=push"
-        assert orclab(*line.split(), "--out", path).returncode == 0
+        assert command(*line.split(), "--out", path).returncode == 0
         with np.load(path) as arrays:
             contents.append({k: arrays[k].tobytes() for k in arrays.files if k != "about"})
     assert contents[0] == contents[1] != contents[2]
 
 
-def test_a_replay_is_the_run_again(tmp_path: Path) -> None:
+def test_a_replay_is_the_run_again(orclab: Orclab, tmp_path: Path) -> None:
     first, second = tmp_path / "first.json", tmp_path / "second.json"
     line = "run joint-control --set noise=0.01 --seconds 0.6 --seed 3 --at 0.2 press=push"
     one = orclab(*line.split(), "--at", "0.3", "kp=900", "--out", first)
@@ -152,7 +180,7 @@ def test_a_replay_is_the_run_again(tmp_path: Path) -> None:
     assert first.read_bytes() == second.read_bytes()
 
 
-def test_a_replay_can_go_on_for_longer(tmp_path: Path) -> None:
+def test_a_replay_can_go_on_for_longer(orclab: Orclab, tmp_path: Path) -> None:
     path = tmp_path / "run.json"
     assert orclab("run", "oscillator", "--seconds", 1, "--out", path).returncode == 0
     assert the_object(orclab("run", "--replay", path, "--seconds", 2))["t"] == 2.0
@@ -165,23 +193,13 @@ Refusing = Callable[..., str]
 
 
 @pytest.fixture
-def refused(capsys: pytest.CaptureFixture[str]) -> Refusing:
-    """Calls the command in this process, which is faster; the sentence with which it refuses."""
-
-    def refuse(*arguments: object) -> str:
-        try:
-            code = main([str(argument) for argument in arguments])
-        except SystemExit as end:  # argparse's way
-            code = int(end.code or 0)
-        said = capsys.readouterr()
-        assert (code, said.out) == (2, "")
-        return said.err
-
-    return refuse
+def refused(orclab: Orclab) -> Refusing:
+    """Calls the command; the sentence with which it refuses."""
+    return lambda *arguments: the_refusal(orclab(*arguments))
 
 
 def test_wrong_use_ends_the_process_with_2_and_no_traceback() -> None:
-    assert the_refusal(orclab("run", "nope")).startswith("orclab: no lab is named 'nope'")
+    assert the_refusal(own_process("run", "nope")).startswith("orclab: no lab is named 'nope'")
 
 
 @pytest.mark.parametrize(
@@ -265,10 +283,10 @@ def test_a_file_that_cannot_be_written_is_refused(refused: Refusing, tmp_path: P
     assert "Is a directory" in sentence
 
 
-def test_a_taken_port_is_refused_with_what_to_do() -> None:
+def test_a_taken_port_is_refused_with_what_to_do(refused: Refusing) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
-        sentence = the_refusal(orclab("--port", port))
+        sentence = refused("--port", port)
     assert f"cannot listen on 127.0.0.1 port {port}" in sentence
     assert "--port 0" in sentence
 
@@ -290,5 +308,5 @@ def test_a_wrong_setting_is_refused_by_name(
 
 
 def test_a_course_that_is_not_there_is_refused_by_name() -> None:
-    sentence = the_refusal(orclab("list", ORCLAB_LABS="no_such_course"))
+    sentence = the_refusal(own_process("list", ORCLAB_LABS="no_such_course"))
     assert "ORCLAB_LABS names no_such_course" in sentence

@@ -11,7 +11,7 @@ import msgspec
 import zstandard
 from websockets.sync.client import connect
 
-from tests.served import Opened
+from tests.served import PATIENCE, Opened
 
 PROTOCOL = "viser-v1.1.1"
 
@@ -69,7 +69,7 @@ class SceneClient:
     def __exit__(self, *_: object) -> None:
         self.socket.close()
 
-    def messages(self, timeout: float = 20.0) -> Iterator[dict[str, Any]]:
+    def messages(self, timeout: float = PATIENCE) -> Iterator[dict[str, Any]]:
         """All messages as they come, noted. Fails after `timeout` seconds of silence."""
         while True:
             while self._unread:
@@ -81,7 +81,7 @@ class SceneClient:
             self._unread.extend(decode(window))
 
     def read_until(self, true: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-        end = time.monotonic() + 20
+        end = time.monotonic() + PATIENCE
         for found in self.messages():
             if true(found):
                 return found
@@ -117,7 +117,7 @@ class SceneClient:
             self.read_until(lambda _: name in self.nodes)
 
     def shows(self, label: str, value: Any) -> None:
-        """Waits until a control shows a value. Fails after 20 s."""
+        """Waits until a control shows a value. Fails after `PATIENCE`."""
         uuid = self.control(label)
         if self.values[uuid] != value:
             self.read_until(lambda _: self.values[uuid] == value)

@@ -92,11 +92,13 @@ def test_only_the_colours_of_a_board_are_sent_again_and_only_while_they_change(
 
     with served.session("board") as session, SceneClient(session) as scene:
         scene.wait_for_node("/board")
-        scene.skip(0.5)
+        updates("dark")  # what belongs to the first picture
+        updates("light")
         waving = {m["name"]: m["updates"] for m in _later(scene, 120)}
         assert set(waving["/board"]) == {"batched_colors"}
         session.set(rate=0.0)
-        scene.skip(1.0)
+        updates("dark")  # what was under way
+        updates("light")
         assert updates("dark") == []
 
 

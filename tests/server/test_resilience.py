@@ -2,6 +2,8 @@
 
 import os
 import signal
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -35,10 +37,10 @@ def test_a_killed_worker_is_replaced_with_the_same_parameters(served: Served) ->
         assert worker not in served.listeners()
 
 
-def test_a_killed_fork_server_takes_nothing_down() -> None:
-    with Served() as server, server.session("oscillator") as session, session.stream() as stream:
+def test_a_killed_fork_server_takes_nothing_down(mortal: Served) -> None:
+    with mortal.session("oscillator") as session, session.stream() as stream:
         stream.next("status", lambda s: s["t"] > 0.3)
-        (fork_server,) = {psutil.Process(worker).ppid() for worker in server.listeners()}
+        (fork_server,) = {psutil.Process(worker).ppid() for worker in mortal.listeners()}
         os.kill(fork_server, signal.SIGKILL)
         assert stream.next("notice")["state"] == "recovering"
         assert stream.next("notice")["state"] == "live"
@@ -105,23 +107,22 @@ def test_a_slow_reader_slows_nobody_and_grows_nothing(served: Served) -> None:
         lazy.next("telemetry", lambda m: m["rows"] and m["rows"][-1][0] > times[-1] - 1)
 
 
-def test_the_session_limit_is_told_in_words() -> None:
-    with Served(ORCLAB_MAX_SESSIONS="1") as server, server.session("oscillator"):
-        answer = server.http.post("/api/sessions", json={"lab": "oscillator"})
+def test_the_session_limit_is_told_in_words(small: Served) -> None:
+    with small.session("oscillator"):
+        answer = small.http.post("/api/sessions", json={"lab": "oscillator"})
         assert answer.status_code == 503
         assert answer.json()["code"] == "full"
         assert "all 1 places are taken" in answer.json()["error"]
 
 
-def test_idle_sessions_end() -> None:
-    with Served(ORCLAB_VIEWERLESS_SECONDS="1", ORCLAB_UNTOUCHED_SECONDS="3") as server:
-        opened = server.http.post("/api/sessions", json={"lab": "oscillator"}).json()
-        until(lambda: server.http.get(f"/api/sessions/{opened['id']}").status_code == 404)
-        with server.session("oscillator") as session, session.stream() as stream:
-            notice = stream.next("notice")
-            assert notice["state"] == "ended"
-            assert "same parameters" in notice["text"]
-        until(lambda: server.health()["sessions"] == 0)
+def test_idle_sessions_end(impatient: Served) -> None:
+    opened = impatient.http.post("/api/sessions", json={"lab": "oscillator"}).json()
+    until(lambda: impatient.http.get(f"/api/sessions/{opened['id']}").status_code == 404)
+    with impatient.session("oscillator") as session, session.stream() as stream:
+        notice = stream.next("notice")
+        assert notice["state"] == "ended"
+        assert "same parameters" in notice["text"]
+    until(lambda: impatient.health()["sessions"] == 0)
 
 
 def test_ended_sessions_leave_no_process(served: Served) -> None:
@@ -133,8 +134,8 @@ def test_ended_sessions_leave_no_process(served: Served) -> None:
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-def test_no_process_survives_the_server(how: signal.Signals) -> None:
-    server = Served()
+def test_no_process_survives_the_server(mortal: Served, how: signal.Signals) -> None:
+    server = mortal
     answer = server.http.post("/api/sessions", json={"lab": "troublesome"}).json()
     path = f"/api/sessions/{answer['id']}/params"
     until(lambda: server.health()["workers"] == 2)
@@ -142,30 +143,39 @@ def test_no_process_survives_the_server(how: signal.Signals) -> None:
     assert len(below) >= 3
     # One of the workers is stuck in an endless loop when the server goes.
     server.http.patch(path, json={"fault": "hang"})
-    os.kill(server.process.pid, how)
-    server.process.wait(20)
+    server.stop(how)
     assert not psutil.wait_procs(below, timeout=10)[1], "these survived"
 
 
-def test_the_first_start_may_take_its_time() -> None:
+def test_the_first_start_may_take_its_time(tmp_path: Path) -> None:
     """Longer than a hung worker is given, and than a session nobody watches."""
-    with Served(
-        wait=False,
-        PREPARE_SECONDS="8",
-        ORCLAB_HANG_SECONDS="1",
-        ORCLAB_VIEWERLESS_SECONDS="5",
-    ) as server:
+    prepared = tmp_path / "prepared"
+    with (
+        Served(
+            wait=False,
+            PREPARED_BY=str(prepared),
+            ORCLAB_HANG_SECONDS="1",
+            ORCLAB_VIEWERLESS_SECONDS="3",
+        ) as server,
+        ThreadPoolExecutor() as pool,
+    ):
         assert server.health()["preparing"]
-        with server.session("oscillator") as session, session.stream() as stream:
-            assert stream.next("status", lambda s: s["t"] > 0)
-            assert not server.health()["preparing"]
+        opening = pool.submit(Opened, server, "oscillator", {})
+        until(lambda: server.health()["sessions"] == 1)
+        asked = time.monotonic()
         assert server.process.stdout is not None
         assert server.process.stdout.readline().startswith("First start: compiling the solvers")
+        until(lambda: time.monotonic() > asked + 4)
+        assert server.health()["preparing"]
+        prepared.touch()
+        with opening.result().stream() as stream:
+            assert stream.next("status", lambda s: s["t"] > 0)
+            assert not server.health()["preparing"]
 
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
-def test_a_server_that_still_prepares_ends_at_once(how: signal.Signals) -> None:
-    server = Served(wait=False, PREPARE_SECONDS="600")
+def test_a_server_that_still_prepares_ends_at_once(how: signal.Signals, tmp_path: Path) -> None:
+    server = Served(wait=False, PREPARED_BY=str(tmp_path / "never"))
     assert server.process.stdout is not None
     assert server.process.stdout.readline().startswith("First start")
     below = server.workers()
@@ -174,25 +184,25 @@ def test_a_server_that_still_prepares_ends_at_once(how: signal.Signals) -> None:
     assert not psutil.wait_procs(below, timeout=10)[1], "these survived"
 
 
-def test_a_server_ends_quietly_though_its_viewers_worker_is_stuck(tmp_path: Path) -> None:
+def test_a_restarted_server_answers_404_for_the_old_session(mortal: Served) -> None:
+    old = mortal.http.post("/api/sessions", json={"lab": "oscillator"}).json()
+    mortal.stop()
+    mortal.start(wait=False)
+    assert mortal.http.get(f"/api/sessions/{old['id']}").status_code == 404
+
+
+def test_a_server_ends_quietly_though_its_viewers_worker_is_stuck(mortal: Served) -> None:
     """The scenes' relays wait for a worker that does not even close its connections."""
-    said = tmp_path / "stderr"
-    with said.open("w") as stderr, Served(ORCLAB_SPARES="0", stderr=stderr) as server:
-        session = Opened(server, "oscillator", {})
-        (worker,) = server.listeners()
-        viewers = [SceneClient(session) for _ in range(5)]
-        os.kill(worker, signal.SIGSTOP)
-        server.stop()
-        for viewer in viewers:
-            viewer.socket.close()
-    text = said.read_text()
+    assert mortal.stderr is not None
+    said = Path(mortal.stderr.name)
+    before = said.stat().st_size
+    (worker,) = mortal.listeners()  # the spare, which the session takes
+    session = Opened(mortal, "oscillator", {})
+    viewers = [SceneClient(session) for _ in range(5)]
+    os.kill(worker, signal.SIGSTOP)
+    mortal.stop()
+    for viewer in viewers:
+        viewer.socket.close()
+    text = said.read_bytes()[before:].decode()
     assert "Traceback" not in text
     assert "Exception" not in text
-
-
-def test_a_restarted_server_answers_404_for_the_old_session() -> None:
-    with Served() as server:
-        old = server.http.post("/api/sessions", json={"lab": "oscillator"}).json()
-        server.stop()
-        server.start()
-        assert server.http.get(f"/api/sessions/{old['id']}").status_code == 404

@@ -1,5 +1,6 @@
 """The scene and its panel through the proxy, as a browser's client sees them."""
 
+import re
 from collections import Counter
 
 import numpy as np
@@ -14,6 +15,19 @@ from server.nodes import COLORS, DARK, LIGHT, paler
 from server.viser_scene import ViserScene
 from tests.served import Served
 from tests.viser_client import PROTOCOL, SceneClient, message
+
+
+def test_the_viewers_script_comes_after_the_element_it_draws_in(served: Served) -> None:
+    """A load that is broken off may run the script, and then has what it draws in."""
+    with served.session("oscillator") as session:
+        whole = served.http.get(session.info["scene"]).text
+        plain = served.http.get(session.info["scene"], headers={"Accept-Encoding": "identity"})
+    assert whole == plain.text
+    assert "content-encoding" not in plain.headers
+    (script,) = (found.start() for found in re.finditer("<script", whole))
+    (root,) = (found.start() for found in re.finditer('<div id="root"></div>', whole))
+    assert whole.index("/static/css/scene.css") < whole.index("</head>") < root < script
+    assert whole[whole.index("</script>") :].split() == ["</script></body>", "</html>"]
 
 
 def test_the_robot_is_a_tree_of_its_joints(served: Served) -> None:

@@ -4,7 +4,6 @@ import asyncio
 import contextlib
 import secrets
 from collections import deque
-from collections.abc import AsyncIterator
 from typing import Any
 
 import orjson
@@ -17,9 +16,8 @@ from server.pipe import HELLO, STATUS
 from server.settings import Settings
 from server.supervisor import Supervisor, Worker, WorkerGone
 from server.tasks import Tasks
+from server.viewers import Viewer
 
-QUEUE = 64
-"""Messages a slow viewer may be behind: two seconds. Then it starts afresh."""
 CRASHES, CRASH_SECONDS = 3, 60.0
 
 
@@ -33,33 +31,6 @@ class NoSession(LabError):
 
 class NotNow(LabError):
     """The session's worker is being replaced."""
-
-
-class Viewer:
-    """One page that watches. Too slow, it loses old telemetry; nobody waits for it."""
-
-    def __init__(self) -> None:
-        self._queue: asyncio.Queue[bytes | None] = asyncio.Queue(QUEUE + 4)
-
-    def push(self, payload: bytes, afresh: list[bytes]) -> None:
-        """Queues a message. A viewer too far behind skips to `afresh` and this one."""
-        if self._queue.qsize() >= QUEUE:
-            while not self._queue.empty():
-                self._queue.get_nowait()
-            for message in afresh:
-                self._queue.put_nowait(message)
-        self._queue.put_nowait(payload)
-
-    def close(self) -> None:
-        """Ends the stream after what is queued."""
-        if self._queue.full():
-            self._queue.get_nowait()
-        self._queue.put_nowait(None)
-
-    async def messages(self) -> AsyncIterator[bytes]:
-        """What to send, until the session ends."""
-        while (payload := await self._queue.get()) is not None:
-            yield payload
 
 
 class Session:
@@ -80,7 +51,7 @@ class Session:
             "speed": 1.0,
             "solver": None,
         }
-        self._kept: dict[int, bytes] = {}
+        self._latest_frames: dict[int, bytes] = {}
         self._crashes: deque[float] = deque(maxlen=CRASHES)
         now = asyncio.get_running_loop().time()
         self.watched = self.touched = now
@@ -105,8 +76,8 @@ class Session:
         worker.on_frame = self._on_frame
         self.worker = worker
         self.state = "live"
-        worker.tell("open", lab=self.entry.slug, **self._latest)
-        worker.tell("viewers", count=len(self.viewers))
+        worker.send("open", lab=self.entry.slug, **self._latest)
+        worker.send("viewers", count=len(self.viewers))
 
     async def change(self, changes: dict[str, Any]) -> dict[str, Any]:
         """New parameters; answers all of them. Raises ParameterError, NotNow."""
@@ -151,7 +122,7 @@ class Session:
     def join(self) -> Viewer:
         """A page begins to watch."""
         viewer = Viewer()
-        for payload in self._kept.values():
+        for payload in self._latest_frames.values():
             viewer.push(payload, [])
         self.viewers.add(viewer)
         self._count()
@@ -171,16 +142,16 @@ class Session:
     def _count(self) -> None:
         with contextlib.suppress(WorkerGone):
             if self.worker:
-                self.worker.tell("viewers", count=len(self.viewers))
+                self.worker.send("viewers", count=len(self.viewers))
 
     def _broadcast(self, payload: bytes) -> None:
-        afresh = list(self._kept.values())
+        latest = list(self._latest_frames.values())
         for viewer in self.viewers:
-            viewer.push(payload, afresh)
+            viewer.push(payload, latest)
 
     def _on_frame(self, kind: int, payload: bytes) -> None:
         if kind in (HELLO, STATUS):
-            self._kept[kind] = payload
+            self._latest_frames[kind] = payload
         if kind == STATUS:
             status = orjson.loads(payload)
             for name in self._latest:
@@ -217,7 +188,8 @@ class Sessions:
 
     async def create(self, entry: Entry, new: NewSession) -> Session:
         """A new session. Raises SessionsFull, ParameterError."""
-        params = entry.lab.Params().change(new.params)
+        Params = entry.lab.Params
+        params = Params().change(Params.read(new.link) | new.params)
         if len(self) >= self._settings.max_sessions:
             raise SessionsFull(
                 f"all {self._settings.max_sessions} places are taken: close another lab's page, "

@@ -18,11 +18,11 @@ ESTIMATE_AFTER = 0.5
 class SolverClock:
     """Runs, holds and steps a world's solver, and looks back at what it found."""
 
-    def __init__(self, world: World, told: Mapping[str, Any] | None) -> None:
-        """`told`: the last status of the session's solver, if it had one."""
+    def __init__(self, world: World, status: Mapping[str, Any] | None) -> None:
+        """`status`: the last one of the session's solver, if it had one."""
         self._world = world
-        self.running: bool = told["running"] if told else True
-        self.pace: float = told["pace"] if told else 0.0
+        self.running: bool = status["running"] if status else True
+        self.pace: float = status["pace"] if status else 0.0
         self._owed = 0
         """Iterations to do although paused."""
         self._midway = False
@@ -47,7 +47,7 @@ class SolverClock:
         """[s] of the wall clock, since it was started and while it ran."""
         self._before = self._progress()
 
-    def obey(self, do: str, **arguments: Any) -> None:
+    def dispatch(self, do: str, **arguments: Any) -> None:
         """Runs, pauses, steps, shows or sets the pace. Raises LabError."""
         if not self._world.lab.has_solver():
             raise LabError("this lab has no solver")

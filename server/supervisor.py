@@ -52,9 +52,9 @@ class Worker:
         self._listening = asyncio.create_task(self._listen())
         self.port = await asyncio.wait_for(self._ready, SPAWN_SECONDS)
 
-    def tell(self, do: str, **arguments: Any) -> None:
+    def send(self, do: str, **arguments: Any) -> None:
         """Says what to do; expects no answer."""
-        self._send({"do": do, "with": arguments})
+        self._write({"do": do, "with": arguments})
 
     async def ask(self, do: str, **arguments: Any) -> Any:
         """What the worker answers. Raises LabError if it refuses, WorkerGone if it is gone or
@@ -85,7 +85,7 @@ class Worker:
         await asyncio.to_thread(self.process.join, 5)
 
     async def _answer(self, do: str, reference: int, arguments: dict[str, Any]) -> Any:
-        self._send({"do": do, "ref": reference, "with": arguments})
+        self._write({"do": do, "ref": reference, "with": arguments})
         return await self._await(reference)
 
     def _expect(self) -> int:
@@ -101,7 +101,7 @@ class Worker:
         finally:
             self._answers.pop(reference, None)
 
-    def _send(self, message: dict[str, Any]) -> None:
+    def _write(self, message: dict[str, Any]) -> None:
         if self.gone:
             raise WorkerGone(self.gone)
         self._writer.write(frame(CONTROL, encode(message)))
@@ -118,7 +118,7 @@ class Worker:
                     self.on_frame(kind, payload)
         except (asyncio.IncompleteReadError, OSError):
             await asyncio.to_thread(self.process.join, 1)
-            self._finish(_obituary(self.process.exitcode))
+            self._finish(_termination(self.process.exitcode))
 
     def _control(self, message: dict[str, Any]) -> None:
         if message.get("ready"):
@@ -242,7 +242,7 @@ async def _on_a_thread(work: Callable[[], None]) -> None:
     loop = asyncio.get_running_loop()
     done: asyncio.Future[None] = loop.create_future()
 
-    def tell(error: BaseException | None) -> None:
+    def finish(error: BaseException | None) -> None:
         if done.done():
             return
         if error:
@@ -257,13 +257,13 @@ async def _on_a_thread(work: Callable[[], None]) -> None:
         except BaseException as problem:
             error = problem
         with contextlib.suppress(RuntimeError):  # the loop has ended: nobody waits any more
-            loop.call_soon_threadsafe(tell, error)
+            loop.call_soon_threadsafe(finish, error)
 
     threading.Thread(target=run, daemon=True).start()
     await done
 
 
-def _obituary(exitcode: int | None) -> str:
+def _termination(exitcode: int | None) -> str:
     if exitcode is not None and exitcode < 0:
         return f"it was ended by {signal.Signals(-exitcode).name}"
     return f"it ended unexpectedly (exit code {exitcode})"

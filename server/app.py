@@ -29,7 +29,7 @@ from server.messages import (
     Press,
     SessionInfo,
 )
-from server.sessions import NoSession, NotNow, Session, Sessions
+from server.sessions import NoSession, Session, Sessions, Unavailable
 from server.settings import Settings
 from server.supervisor import Supervisor
 from server.viewers import Viewer
@@ -118,7 +118,7 @@ async def create_session(request: Request, new: NewSession) -> SessionInfo:
     try:
         session = await _sessions(request).create(find(new.lab), new)
     except asyncio.CancelledError:
-        raise NotNow("the server stops: start it again, and open the lab anew") from None
+        raise Unavailable("the server stops: start it again, and open the lab anew") from None
     return session.info()
 
 

@@ -63,7 +63,7 @@ class Broadcast:
         self._urgent = False
         self._lateness = 0.0
 
-    def urge(self) -> None:
+    def request_update(self) -> None:
         """Something was changed: its effect is due now, not at the next beat."""
         self._urgent = True
         self._due["status"] = 0.0
@@ -75,7 +75,7 @@ class Broadcast:
             frame = min(frame, self._pacer.next_step(now))
         return max(frame, now)
 
-    def woke(self, late: float) -> None:
+    def note_wake(self, late: float) -> None:
         """The loop woke up so many seconds after it had wished to."""
         self._lateness += 0.02 * (max(0.0, late) - self._lateness)
 
@@ -89,20 +89,20 @@ class Broadcast:
         if self._urgent and fresh:
             self._due["telemetry"] = self._due["fields"] = self._due["scene"] = 0.0
             self._urgent = False
-        if self._beat("telemetry", now, TELEMETRY):
+        if self._is_due("telemetry", now, TELEMETRY):
             self._send_telemetry(now)
 
     def draw(self, now: float) -> None:
         """The scene, if it is due."""
         frame = FRAME if self._lateness < LATE else 2 * FRAME
-        if self._beat("scene", now, frame) and not self._controls.failure:
+        if self._is_due("scene", now, frame) and not self._controls.failure:
             self._scene.draw(self._world)
 
     def send_due_status(self, now: float) -> None:
         """The status, twice a second and when the solver has come on."""
         if self._world.shown is not self._status_shown:
             self._due["status"] = min(self._due["status"], self._status_sent + SOLVER_EVERY)
-        if self._beat("status", now, STATUS_EVERY):
+        if self._is_due("status", now, STATUS_EVERY):
             self.send_status(now)
 
     def send_hello(self) -> None:
@@ -132,7 +132,7 @@ class Broadcast:
         self._link.send(STATUS, status.model_dump())
         self._status_sent, self._status_shown = now, world.shown
 
-    def _beat(self, what: str, now: float, every: float) -> bool:
+    def _is_due(self, what: str, now: float, every: float) -> bool:
         if now < self._due[what]:
             return False
         self._due[what] = max(self._due[what] + every, now + every / 2)
@@ -144,13 +144,13 @@ class Broadcast:
         self._sent_rows = world.recorder.count
         fields = None
         wanted = controls.viewers and self._fields and not controls.failure
-        if wanted and self._beat("fields", now, FIELDS):
+        if wanted and self._is_due("fields", now, FIELDS):
             known: dict[str, np.ndarray | str] = {
                 **world.lab.fields(world.params, world.state),
                 **world.lab.notes(world.params, world.state),
             }
             fields = {name: known[name] for name in self._fields if name in known}
-        now_row = None if len(rows) else self._unrecorded()
+        now_row = None if len(rows) else self._current_row()
         if len(rows):
             self._measured = world.state, world.params
         if controls.viewers and (len(rows) or fields or now_row is not None):
@@ -158,7 +158,7 @@ class Broadcast:
             sample = Telemetry(world.runs, rows.astype("float32"), now_row, fields)
             self._link.send(STREAM, sample)
 
-    def _unrecorded(self) -> np.ndarray | None:
+    def _current_row(self) -> np.ndarray | None:
         """What a solver or a parameter has changed while the world stands still; once."""
         world, controls = self._world, self._controls
         known = world.state is self._measured[0] and world.params is self._measured[1]

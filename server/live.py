@@ -54,7 +54,7 @@ class LiveSession:
             for item in self.mailbox.take(wake - time.perf_counter()):
                 self._dispatch(item)
             now = time.perf_counter()
-            self.broadcast.woke(now - wake)
+            self.broadcast.note_wake(now - wake)
             with self._guard():
                 if self.controls.moving:
                     self.pacer.advance(now, until=now + BUSY)
@@ -85,7 +85,7 @@ class LiveSession:
             # The status goes first: who has the answer finds the session as it is now.
             self.broadcast.send_status(time.perf_counter())
             self.link.send(CONTROL, {"ref": item.ref, "answer": answer, "error": error})
-        self.broadcast.urge()
+        self.broadcast.request_update()
 
     def _do_params(self, changes: dict[str, Any]) -> dict[str, Any]:
         runs = self.world.runs
@@ -200,5 +200,5 @@ class LiveSession:
             f"The lab failed at t = {self.world.t:.2f} s ({type(error).__name__}: {error}). "
             "This is a defect of the lab, not of your settings. Reset starts again."
         )
-        self.broadcast.urge()
+        self.broadcast.request_update()
         return self.controls.failure

@@ -10,13 +10,13 @@ from starlette.exceptions import HTTPException
 from labs.errors import LabError, UnknownLab
 from server import pages
 from server.messages import Problem
-from server.sessions import NoSession, NotNow, SessionsFull
+from server.sessions import NoSession, SessionsFull, Unavailable
 
 STATUS_OF: dict[type[LabError], tuple[int, str]] = {
     UnknownLab: (404, "unknown-lab"),
     NoSession: (404, "no-session"),
     SessionsFull: (503, "full"),
-    NotNow: (503, "not-now"),
+    Unavailable: (503, "not-now"),
     LabError: (422, "invalid"),
 }
 RESPONSES: dict[int | str, dict[str, Any]] = {

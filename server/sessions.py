@@ -29,7 +29,7 @@ class NoSession(LabError):
     """No session has this id (any more)."""
 
 
-class NotNow(LabError):
+class Unavailable(LabError):
     """The session's worker is being replaced."""
 
 
@@ -80,42 +80,42 @@ class Session:
         worker.send("viewers", count=len(self.viewers))
 
     async def change(self, changes: dict[str, Any]) -> dict[str, Any]:
-        """New parameters; answers all of them. Raises ParameterError, NotNow."""
+        """New parameters; answers all of them. Raises ParameterError, Unavailable."""
         self.entry.lab.Params().change(changes)
         params: dict[str, Any] = await self.ask("params", changes=changes)
         self._latest["params"] = params
         return params
 
     async def ask(self, do: str, **arguments: Any) -> Any:
-        """What the worker answers. Raises LabError, NotNow."""
+        """What the worker answers. Raises LabError, Unavailable."""
         self.touched = asyncio.get_running_loop().time()
         try:
-            return await self._present().ask(do, **arguments)
+            return await self._live_worker().ask(do, **arguments)
         except WorkerGone:
-            raise self._not_now() from None
+            raise self._unavailable() from None
 
     async def load(self, path: str) -> dict[str, Any]:
-        """Takes up a solution from a file; answers all parameters. Raises LabError, NotNow."""
+        """Takes up a solution from a file; answers all parameters. Raises LabError, Unavailable."""
         params: dict[str, Any] = await self.ask("load", path=path)
         self._latest["params"] = params
         return params
 
     async def write(self, what: str, form: str, path: str) -> None:
-        """Writes the recording ("export") or the solution to a file. Raises LabError, NotNow."""
+        """Writes the recording ("export") or the solution to a file. Raises LabError, Unavailable."""
         try:
-            await self._present().ask_for_file(what, form, path)
+            await self._live_worker().ask_for_file(what, form, path)
         except WorkerGone:
-            raise self._not_now() from None
+            raise self._unavailable() from None
 
-    def _present(self) -> Worker:
+    def _live_worker(self) -> Worker:
         if self.worker is None or self.worker.gone:
-            raise self._not_now()
+            raise self._unavailable()
         return self.worker
 
-    def _not_now(self) -> NotNow:
+    def _unavailable(self) -> Unavailable:
         if self.state == "failed":
-            return NotNow("this session has ended after repeated crashes: open the lab anew")
-        return NotNow("the simulation is being restarted: try again in a moment")
+            return Unavailable("this session has ended after repeated crashes: open the lab anew")
+        return Unavailable("the simulation is being restarted: try again in a moment")
 
     # Viewers ------------------------------------------------------------------------------------
 
@@ -179,12 +179,12 @@ class Sessions:
         return len(self._sessions)
 
     def start(self) -> None:
-        self._tasks.do(self._reap())
+        self._tasks.spawn(self._reap())
 
     async def stop(self) -> None:
         self._tasks.cancel()
         for session in tuple(self._sessions.values()):
-            self._forget(session, "ended", "The server stops.")
+            self._close(session, "ended", "The server stops.")
 
     async def create(self, entry: Entry, new: NewSession) -> Session:
         """A new session. Raises SessionsFull, ParameterError."""
@@ -200,11 +200,11 @@ class Sessions:
         try:
             await session.open(self._supervisor)
         except WorkerGone as error:
-            self._forget(session, "failed", str(error))
-            raise NotNow(f"the lab could not be opened ({error}): try again") from None
+            self._close(session, "failed", str(error))
+            raise Unavailable(f"the lab could not be opened ({error}): try again") from None
         if session.id not in self._sessions:
-            self._forget(session, "ended", "")
-            raise NotNow("the session was closed before it opened: open the lab anew")
+            self._close(session, "ended", "")
+            raise Unavailable("the session was closed before it opened: open the lab anew")
         self._watch(session)
         return session
 
@@ -219,12 +219,12 @@ class Sessions:
 
     async def delete(self, session_id: str) -> None:
         """Ends a session. Raises NoSession."""
-        self._forget(self.find(session_id), "ended", "This session was closed.")
+        self._close(self.find(session_id), "ended", "This session was closed.")
 
     def _watch(self, session: Session) -> None:
         worker = session.worker
         assert worker is not None
-        worker.on_gone = lambda reason: self._tasks.do(self._recover(session, reason))
+        worker.on_gone = lambda reason: self._tasks.spawn(self._recover(session, reason))
         if worker.gone:
             worker.on_gone(worker.gone)
 
@@ -251,12 +251,12 @@ class Sessions:
             await self._recover(session, str(error))
             return
         if session.id not in self._sessions:
-            self._forget(session, "ended", "")
+            self._close(session, "ended", "")
             return
         session.notify("live", f"The simulation was restarted with your parameters: {reason}.")
         self._watch(session)
 
-    def _forget(self, session: Session, state: str, text: str) -> None:
+    def _close(self, session: Session, state: str, text: str) -> None:
         self._sessions.pop(session.id, None)
         session.notify(state, text)
         for viewer in session.viewers:
@@ -264,7 +264,7 @@ class Sessions:
         worker, session.worker = session.worker, None
         if worker:
             worker.on_gone = lambda reason: None
-            self._tasks.do(self._supervisor.release(worker, "its session ended"))
+            self._tasks.spawn(self._supervisor.release(worker, "its session ended"))
 
     async def _reap(self) -> None:
         settings = self._settings
@@ -275,10 +275,10 @@ class Sessions:
                 if session.state == "starting":
                     session.watched = now  # its first worker may take a minute
                 elif not session.viewers and now - session.watched > settings.viewerless_seconds:
-                    self._forget(session, "ended", "Nobody was watching.")
+                    self._close(session, "ended", "Nobody was watching.")
                 elif now - session.touched > settings.untouched_seconds:
                     minutes = settings.untouched_seconds / 60
-                    self._forget(
+                    self._close(
                         session,
                         "ended",
                         f"Nobody touched this lab for {minutes:.0f} minutes, so it made room for "

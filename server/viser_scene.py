@@ -20,7 +20,7 @@ from server import meshes
 from server.boards import CellsNode, SurfaceNode
 from server.mailbox import Mailbox
 from server.messages import View
-from server.nodes import COLORS, ArmNode, Node, paler
+from server.nodes import COLORS, ArmNode, Node, blend_with_background
 from server.surroundings import show_surroundings
 
 TRAIL_EVERY = 3
@@ -77,8 +77,10 @@ class ViserScene:
         ghost: bool = False,
         effort: np.ndarray | None = None,
     ) -> None:
-        look = (id(arm), ghost)
-        node = self._node(name, look, lambda: ArmNode(self._server, name, arm, ghost, self._view))
+        appearance = (id(arm), ghost)
+        node = self._node(
+            name, appearance, lambda: ArmNode(self._server, name, arm, ghost, self._view)
+        )
         assert isinstance(node, ArmNode)
         node.move(q)
         if effort is not None:
@@ -90,7 +92,7 @@ class ViserScene:
         if len(points) < 2:
             return
         segments = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
-        mixed = paler(color, strength, self._view.dark)
+        mixed = blend_with_background(color, strength, self._view.dark)
 
         def make() -> Node:
             return Node(
@@ -265,14 +267,14 @@ class ViserScene:
 
     # Nodes ----------------------------------------------------------------------------------
 
-    def _node(self, name: str, look: object, make: Callable[[], Node]) -> Node:
-        """The node of this name, made anew where it must look different."""
+    def _node(self, name: str, appearance: object, make: Callable[[], Node]) -> Node:
+        """The node of this name, made anew where it must appearance different."""
         node = self._nodes.get(name)
-        if node is None or node.look != look:
+        if node is None or node.appearance != appearance:
             if node is not None:
                 node.remove()
             node = self._nodes[name] = make()
-            node.look = look
+            node.appearance = appearance
         self._drawn.add(name)
         return node
 

@@ -268,7 +268,7 @@ class ViserScene:
     # Nodes ----------------------------------------------------------------------------------
 
     def _node(self, name: str, appearance: object, make: Callable[[], Node]) -> Node:
-        """The node of this name, made anew where it must appearance different."""
+        """The node of this name, made anew where it must look different."""
         node = self._nodes.get(name)
         if node is None or node.appearance != appearance:
             if node is not None:

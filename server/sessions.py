@@ -101,7 +101,7 @@ class Session:
         return params
 
     async def write(self, what: str, form: str, path: str) -> None:
-        """Writes the recording ("export") or the solution to a file. Raises LabError, Unavailable."""
+        """Writes the recording ("export") or the solution to a file. Raises as `ask`."""
         try:
             await self._live_worker().ask_for_file(what, form, path)
         except WorkerGone:

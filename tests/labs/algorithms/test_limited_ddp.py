@@ -38,7 +38,9 @@ def limited_problem(seed: int) -> tuple[Problem, np.ndarray, Options]:
         target=None if MOTIONS[name].goal else np.array([0.4, -0.35, 0.25]),
         limit=rng.uniform(0.2, 1.5),
     )
-    guess = first_guess(problem, np.array(MOTIONS[name].size), rng.uniform(-1, 1), rng.uniform(0, 2))
+    guess = first_guess(
+        problem, np.array(MOTIONS[name].size), rng.uniform(-1, 1), rng.uniform(0, 2)
+    )
     options = Options(second_order=bool(rng.integers(2)), tolerance=1e-8, iterations=300)
     return problem, guess, options
 

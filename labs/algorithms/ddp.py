@@ -28,6 +28,8 @@ from labs.algorithms.ddp_sweep import backward_pass
 from labs.algorithms.regularisation import Regularisation, regularisation
 from labs.errors import LabError
 from labs.problems.optimal_control import (
+from labs.problems.optimal_control import (
+    AT_BOUND,
     Model,
     Pieces,
     Problem,
@@ -198,6 +200,8 @@ def _direction(
     low = high = np.empty((0, 0))
     if problem.bound is not None:
         low, high = -problem.bound - at.U, problem.bound - at.U
+        low[-low <= AT_BOUND * problem.bound] = 0.0
+        high[high <= AT_BOUND * problem.bound] = 0.0
 
     def sweep(mu: float) -> tuple[int, float, float]:
         return backward_pass(model.A, model.B, model.second, *model.cost, mu, low, high, w, K)

@@ -20,7 +20,10 @@ import numpy as np
 from labs.errors import LabError
 
 NEGLIGIBLE = 1e-9
-"""An asymmetry or a negative eigenvalue of at most this share of the largest entry is rounding."""
+"""An asymmetry or a negative eigenvalue of at most this, of a weight scaled to a diagonal of ones,
+is rounding."""
+ROUNDING = 1e-13
+"""An eigenvalue of at most this, likewise, is zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,22 +231,47 @@ def check_shape(name: str, array: np.ndarray, shape: tuple[int, ...], horizon: i
 
 def check_weight(name: str, stack: np.ndarray, definite: bool = False) -> None:
     """Raises LabError unless each of the matrices (k, n, n) is symmetric and positive
-    semidefinite, or definite."""
-    size = np.abs(stack).max(axis=(1, 2))
-    skew = np.abs(stack - stack.transpose(0, 2, 1)).max(axis=(1, 2))
-    if (skew > NEGLIGIBLE * size).any():
-        raise LabError(f"{name} is not symmetric: entries differ by {skew.max():.3g} across it")
-    least = np.linalg.eigvalsh(stack)[:, 0]
+    semidefinite, or definite. What is rounding is told in the units that make the diagonal one."""
+    units = unit_scale(stack)
+    scaled = units[:, :, None] * stack * units[:, None, :]
+    skew = np.abs(scaled - scaled.transpose(0, 2, 1)) > NEGLIGIBLE
+    if skew.any():
+        apart = np.abs(stack - stack.transpose(0, 2, 1))[skew].max()
+        raise LabError(f"{name} is not symmetric: entries differ by {apart:.3g} across it")
+    least, size = np.linalg.eigvalsh(scaled)[:, 0], np.abs(scaled).max(axis=(1, 2))
     if definite and (least <= 0.0).any():
         raise LabError(
-            f"{name} has an eigenvalue {least.min():.3g}: it takes a positive definite matrix, "
+            f"{name} has an eigenvalue {_least(stack):.3g}: it takes a positive definite matrix, "
             "all eigenvalues above zero"
         )
     if (least < -NEGLIGIBLE * size).any():
         raise LabError(
-            f"{name} has an eigenvalue {least.min():.3g}: it takes a positive semidefinite "
+            f"{name} has an eigenvalue {_least(stack):.3g}: it takes a positive semidefinite "
             "matrix, no eigenvalue below zero"
         )
+
+
+def unit_scale(stack: np.ndarray) -> np.ndarray:
+    """Units d (k, n) in which d_i W_ij d_j has ones on its diagonal, or minus ones; 1 where the
+    matrices W (k, n, n) have a zero there."""
+    diagonal = np.abs(np.einsum("kii->ki", stack))
+    return np.asarray(1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)))
+
+
+def weight_roots(stack: np.ndarray) -> np.ndarray:
+    """Matrices V (k, n, n) with V' V = W of semidefinite W (k, n, n), each entry to the accuracy
+    of its own row: by the eigenvectors of W in units that make its diagonal one."""
+    units = unit_scale(stack)
+    share, directions = np.linalg.eigh(units[:, :, None] * stack * units[:, None, :])
+    share[share <= ROUNDING] = 0.0
+    scaled = np.sqrt(share)[:, :, None] * directions.transpose(0, 2, 1)
+    roots: np.ndarray = scaled / units[:, None, :]
+    return roots
+
+
+def _least(stack: np.ndarray) -> float:
+    """The least eigenvalue."""
+    return float(np.linalg.eigvalsh(stack).min())
 
 
 def _every(stack: np.ndarray, horizon: int) -> np.ndarray:

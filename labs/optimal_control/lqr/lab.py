@@ -464,6 +464,8 @@ def _verdict(law: Regulator) -> str:
         return "Studied; there is no steady state to go to."
     if law.steady.trouble:
         return law.steady.trouble
+    if law.mismatch < 0.0:
+        return "Studied. SciPy does not solve this equation."
     return f"Studied. Recursion and SciPy differ by {law.mismatch:.0e} of P's size."
 
 

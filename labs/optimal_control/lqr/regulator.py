@@ -100,10 +100,12 @@ class Regulator:
         if self.steady is None:
             return -1.0
         try:
-            theirs = steady_state_directly(p.a, p.b, p.q, p.r).value
+            theirs = steady_state_directly(p.a, p.b, p.q, p.r)
         except LabError:
             return -1.0
-        return float(np.abs(self.steady.value - theirs).max() / np.abs(theirs).max())
+        if theirs.trouble:
+            return -1.0
+        return float(np.abs(self.steady.value - theirs.value).max() / np.abs(theirs.value).max())
 
     @cached_property
     def constant(self) -> int:

@@ -28,7 +28,6 @@ from labs.algorithms.ddp_sweep import backward_pass
 from labs.algorithms.regularisation import Regularisation, regularisation
 from labs.errors import LabError
 from labs.problems.optimal_control import (
-from labs.problems.optimal_control import (
     AT_BOUND,
     Model,
     Pieces,

@@ -19,7 +19,7 @@ from labs.shapes import BLUE, DARK, LIGHT, ORANGE, Box, Cylinder, Sphere, primit
 
 CART, POLE, LENGTH, RADIUS = 1.0, 0.3, 0.6, 0.015
 """Masses of cart and rod [kg], length and radius of the rod [m]."""
-HINGE_HEIGHT, REACH = 0.75, 1.5
+HINGE_HEIGHT, HALF_RAIL = 0.75, 1.5
 """Of the hinge over the floor; half the rail's length [m]. The rail has no end stops."""
 
 
@@ -39,10 +39,10 @@ def cart_pole() -> Arm:
     axle = pin.SE3(pin.rpy.rpyToMatrix(0.0, np.pi / 2, 0.0), np.array([-0.02, 0.0, 0.0]))
     post = Box((0.05, 0.05, HINGE_HEIGHT))
     visuals = (
-        primitive(0, along, Cylinder(0.018, 2 * REACH), LIGHT),
+        primitive(0, along, Cylinder(0.018, 2 * HALF_RAIL), LIGHT),
         *(
             primitive(0, translation(-0.1, y, HINGE_HEIGHT / 2), post, DARK)
-            for y in (-REACH, REACH)
+            for y in (-HALF_RAIL, HALF_RAIL)
         ),
         primitive(cart, below, Box(box), BLUE),
         primitive(cart, axle, Cylinder(0.02, 0.1), DARK),

@@ -119,9 +119,9 @@ class LqrProblem:
         """J of a trajectory: x (N + 1, n), u (N, m)."""
         terms, end = self.terms, x[-1]
         stage = (
-            np.einsum("ti,tij,tj->t", x[:-1], _every(terms["q"], self.horizon), x[:-1])
-            + np.einsum("ti,tij,tj->t", u, _every(terms["r"], self.horizon), u)
-            + 2.0 * np.einsum("ti,tij,tj->t", x[:-1], _every(terms["s"], self.horizon), u)
+            np.einsum("ti,tij,tj->t", x[:-1], _broadcast(terms["q"], self.horizon), x[:-1])
+            + np.einsum("ti,tij,tj->t", u, _broadcast(terms["r"], self.horizon), u)
+            + 2.0 * np.einsum("ti,tij,tj->t", x[:-1], _broadcast(terms["s"], self.horizon), u)
             + 2.0 * (terms["q_linear"] * x[:-1]).sum(axis=1)
             + 2.0 * (terms["s_linear"] * u).sum(axis=1)
             + terms["constant"]
@@ -131,7 +131,7 @@ class LqrProblem:
 
     def follow(self, policy: "LqrPolicy", x0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """x (N + 1, n) and u (N, m) from x0 (n,) under the policy."""
-        a, b, c = (_every(self.terms[name], self.horizon) for name in "abc")
+        a, b, c = (_broadcast(self.terms[name], self.horizon) for name in "abc")
         x, u = np.zeros((self.horizon + 1, self.n)), np.zeros((self.horizon, self.m))
         x[0] = x0
         for t in range(self.horizon):
@@ -274,7 +274,7 @@ def _least(stack: np.ndarray) -> float:
     return float(np.linalg.eigvalsh(stack).min())
 
 
-def _every(stack: np.ndarray, horizon: int) -> np.ndarray:
+def _broadcast(stack: np.ndarray, horizon: int) -> np.ndarray:
     """The terms (N or 1, ...) as a view of N of them."""
     return np.broadcast_to(stack, (horizon, *stack.shape[1:]))
 
@@ -282,5 +282,5 @@ def _every(stack: np.ndarray, horizon: int) -> np.ndarray:
 def _blocks(rows: Sequence[Sequence[np.ndarray]]) -> np.ndarray:
     """Stacks of matrices (k or 1, ., .) put together as the blocks of larger ones."""
     steps = max(len(part) for row in rows for part in row)
-    joined = [np.concatenate([_every(part, steps) for part in row], axis=2) for row in rows]
+    joined = [np.concatenate([_broadcast(part, steps) for part in row], axis=2) for row in rows]
     return np.concatenate(joined, axis=1)

@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from labs.models.discrete import Discrete
 from labs.models.mechanisms import Mechanism
-from labs.problems.optimal_control import Problem
+from labs.problems.optimal_control import OptimalControlProblem
 from labs.tasks.motion.cost import MotionCost
 
 BARRIER = 1e-8
@@ -93,7 +93,9 @@ class Optimum:
     U: np.ndarray
 
 
-def optimum(problem: Problem, X: np.ndarray, U: np.ndarray, warm: bool = False) -> Optimum:
+def optimum(
+    problem: OptimalControlProblem, X: np.ndarray, U: np.ndarray, warm: bool = False
+) -> Optimum:
     """Of the local minimum near X (N + 1, nx), U (N, nu), where Ipopt starts: well within the
     bounds, or if `warm`, right there, with a small barrier."""
     plant, cost, N = problem.dynamics, problem.cost, problem.N
@@ -138,9 +140,9 @@ def optimum(problem: Problem, X: np.ndarray, U: np.ndarray, warm: bool = False) 
         J += dx.T @ cost.Q @ dx + du.T @ cost.R @ du
     dx = x[:, N] - cost.x_ref
     J += dx.T @ cost.Q_f @ dx
-    if cost.reach:
-        off = tip_position(m)(x[:n, N]) - cost.reach.target
-        J += cost.reach.rho * ca.dot(off, off)
+    if cost.tip_cost:
+        off = tip_position(m)(x[:n, N]) - cost.tip_cost.target
+        J += cost.tip_cost.rho * ca.dot(off, off)
     opti.minimize(J)
     quiet: Any = {"print_level": 0, "sb": "yes", "tol": 1e-10, "max_iter": 500}
     if warm:

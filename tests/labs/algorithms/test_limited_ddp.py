@@ -7,9 +7,9 @@ import pytest
 
 from labs.algorithms import ddp
 from labs.algorithms.ddp import Iterate, Options
-from labs.problems.optimal_control import Problem
+from labs.problems.optimal_control import OptimalControlProblem
 from labs.tasks.motion.cost import MotionCost
-from labs.tasks.motion.motions import MOTIONS, Weights, first_guess, motion_problem
+from labs.tasks.motion.motions import MOTIONS, MotionWeights, first_guess, motion_problem
 from tests.labs.algorithms.ipopt_oracle import optimum
 
 NOTICEABLE = 1e-4
@@ -22,12 +22,12 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def limited_problem(seed: int) -> tuple[Problem, np.ndarray, Options]:
+def limited_problem(seed: int) -> tuple[OptimalControlProblem, np.ndarray, Options]:
     """A random one, its first guess and options; six in a row are of all systems."""
     rng = np.random.default_rng(seed)
     name = tuple(MOTIONS)[seed % len(MOTIONS)]
     ranges = ((1.0, 1e4), (0.01, 1e3), (0.01, 10.0), (1e-3, 1.0), (1e-3, 10.0))
-    weights = Weights(*(log_uniform(rng, *ends) for ends in ranges))
+    weights = MotionWeights(*(log_uniform(rng, *ends) for ends in ranges))
     h = float(rng.choice([0.02, 0.04]))
     problem = motion_problem(
         name,
@@ -39,13 +39,13 @@ def limited_problem(seed: int) -> tuple[Problem, np.ndarray, Options]:
         limit=rng.uniform(0.2, 1.5),
     )
     guess = first_guess(
-        problem, np.array(MOTIONS[name].size), rng.uniform(-1, 1), rng.uniform(0, 2)
+        problem, np.array(MOTIONS[name].control_scale), rng.uniform(-1, 1), rng.uniform(0, 2)
     )
     options = Options(second_order=bool(rng.integers(2)), tolerance=1e-8, iterations=300)
     return problem, guess, options
 
 
-def check_against_ipopt(problem: Problem, found: Iterate) -> None:
+def check_against_ipopt(problem: OptimalControlProblem, found: Iterate) -> None:
     wanted = optimum(problem, found.X, found.U, warm=True)
     assert problem.bound is not None
     if np.abs((wanted.U - found.U) / problem.bound).max() < NEARBY:
@@ -75,11 +75,13 @@ def test_nothing_nearby_is_better_of_five_hundred() -> None:
     assert converged > 400
 
 
-def swing_up() -> tuple[Problem, np.ndarray]:
+def swing_up() -> tuple[OptimalControlProblem, np.ndarray]:
     """Of the double pendulum, within narrow bounds."""
-    weights = Weights(goal=10.0, rest=1.0, posture=3.0, velocity=0.01, control=0.01)
+    weights = MotionWeights(goal=10.0, rest=1.0, posture=3.0, velocity=0.01, control=0.01)
     problem = motion_problem("double-pendulum", weights, 25, 0.04, limit=0.7)
-    return problem, first_guess(problem, np.array(MOTIONS["double-pendulum"].size), 0.1, 1.0)
+    return problem, first_guess(
+        problem, np.array(MOTIONS["double-pendulum"].control_scale), 0.1, 1.0
+    )
 
 
 def test_a_control_a_rounding_within_its_bound_does_not_end_the_search() -> None:
@@ -90,7 +92,7 @@ def test_a_control_a_rounding_within_its_bound_does_not_end_the_search() -> None
     check_against_ipopt(problem, found)
 
 
-def in_other_units(problem: Problem, scale: float) -> Problem:
+def in_other_units(problem: OptimalControlProblem, scale: float) -> OptimalControlProblem:
     c = problem.cost
     assert isinstance(c, MotionCost)
     return replace(problem, cost=replace(c, Q=scale * c.Q, R=scale * c.R, Q_f=scale * c.Q_f))

@@ -281,7 +281,7 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         V, policy = _shown(params, state)
         stages, _ = finite_horizon(state.problem, params.w_f)
         best = float(found.limits[3, found.start])
-        controls = np.zeros(found.mdp.X) if policy is None else policy.astype(float)
+        controls = np.full(found.mdp.X, np.nan) if policy is None else policy.astype(float)
         if isinstance(found.place, GridWorld):
             rows, columns = found.place.shape
             across, up = np.arange(1.0, columns + 1), np.arange(1.0, rows + 1)
@@ -289,7 +289,7 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         else:
             every = -(-found.place.q_nodes // PIXELS)
             across, up = found.place.angles[::every], found.place.velocities[::every]
-            tables = (V, found.efforts[controls.astype(int)])
+            tables = (V, controls if policy is None else found.efforts[policy])
             values, control = (x.reshape(found.place.shape)[::every, ::every].T for x in tables)
         return curves(state.standing, found.mdp.gamma, POINTS) | {
             "stages": np.arange(HORIZON + 1.0),

@@ -109,8 +109,7 @@ def controls(process: RewardProcess, gamma: float) -> str:
     if not len(wins):
         return "No control is better than this policy: V = min Q in every state."
     told = [
-        f"{table.controls[best[x]]} in {table.states[x]} "
-        f"({_number(Q[x, best[x]])} < {_number(found.V[x])})"
+        f"{table.controls[best[x]]} in {table.states[x]} ({_less(Q[x, best[x]], found.V[x])})"
         for x in wins
     ]
     return f"Once, and then the policy, is cheaper (Q < V): {', '.join(told)}."
@@ -173,8 +172,14 @@ def _names(names: tuple[str, ...], states: np.ndarray) -> str:
     return told[0] if len(told) == 1 else f"{', '.join(told[:-1])} and {told[-1]}"
 
 
-def _number(value: float) -> str:
-    return f"{value:.3g}".replace("-", "−")
+def _number(value: float, digits: int = 3) -> str:
+    return f"{value:.{digits}g}".replace("-", "−")
+
+
+def _less(a: float, b: float) -> str:
+    """a < b, in as many digits as it takes to see it."""
+    digits = next((d for d in range(3, 17) if f"{a:.{d}g}" != f"{b:.{d}g}"), 17)
+    return f"{_number(a, digits)} < {_number(b, digits)}"
 
 
 def _times(n: int) -> str:

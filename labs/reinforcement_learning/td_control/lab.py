@@ -92,10 +92,10 @@ class TdControl(Lab[TdParams, TdState]):
         _curves("Cost of an episode while learning", "J", "online", "online_low", "online_high"),
         _curves("Cost of the greedy policy, median", "J", "offline"),
         _curves("Distance to Q*", "mean (root of squares); dashed: largest", "off", "most"),
-        HeatMap("Q of the learner shown", "x", "y", "q", *AXES, "Q"),
-        HeatMap("Greedy policy", "x", "y", "policy", *AXES, "u"),
-        HeatMap("Visits", "x", "y", "visits", *AXES, "log₁₀(1 + n)"),
-        HeatMap("Error of min Q", "x", "y", "error", *AXES, "|V − V*|"),
+        HeatMap("Q of the learner shown", "x", "y", "q", *AXES, "Q", gaps=True),
+        HeatMap("Greedy policy", "x", "y", "policy", *AXES, "u", gaps=True),
+        HeatMap("Visits", "x", "y", "visits", *AXES, "log₁₀(1 + n)", gaps=True),
+        HeatMap("Error of min Q", "x", "y", "error", *AXES, "|V − V*|", gaps=True),
         TimeSeries("Cost of the walk in the scene", "", Line("paid", "J"), select="method"),
         Readout("trained", "Episodes of each learner", "", whole=True),
         Readout("optimum", "Optimal cost", ""),
@@ -197,7 +197,7 @@ class TdControl(Lab[TdParams, TdState]):
         if training["offline"].shape[-1]:
             for name, costs in zip(ORDER, training["offline"][..., -1], strict=False):
                 measured[f"greedy_{name}"] = float(np.median(costs))
-                if task.mdp.deterministic:
+                if task.mdp.deterministic and np.isfinite(best):
                     measured[f"best_{name}"] = float((costs <= best + OPTIMAL).sum())
         return measured
 
@@ -206,7 +206,7 @@ class TdControl(Lab[TdParams, TdState]):
         task, training = params.task, _present(params, state)
         m, s = params.view
         q, visits = training["q"][m, s], training["visits"][m, s]
-        value, best = q.min(axis=1), np.where(task.judged, task.q_star.min(axis=1), 0.0)
+        value, best = q.min(axis=1), np.where(task.judged, task.q_star.min(axis=1), np.nan)
         control = min(round(params.control), task.mdp.U)
         meaning = np.arange(1.0, task.mdp.U + 1)
         x, y = np.arange(task.shape[1]), np.arange(task.shape[0])
@@ -216,10 +216,10 @@ class TdControl(Lab[TdParams, TdState]):
             "q": q[:, control - 1] if control else value,
             "policy": meaning[q.argmin(axis=1)],
             "visits": np.log10(1.0 + visits.sum(axis=1)),
-            "error": np.where(task.judged, np.abs(value - best), 0.0),
+            "error": np.abs(value - best),
         }
         upright = -1 if params.system == "grid" else 1
-        laid = {name: task.laid(values)[::upright] for name, values in maps.items()}
+        laid = {name: task.laid(values, np.nan)[::upright] for name, values in maps.items()}
         return {"x": x, "y": y} | laid | _progress(task, training)
 
     def draw(self, scene: Scene, params: TdParams, state: TdState) -> None:

@@ -64,9 +64,9 @@ class Task:
         """Where a greedy policy is tried from."""
         return int(self.trial.starts[0])
 
-    def laid(self, values: np.ndarray) -> np.ndarray:
-        """(rows, columns): `values` (X,) on the map, 0 where there is no state."""
-        laid = np.zeros(self.shape)
+    def laid(self, values: np.ndarray, fill: float = 0.0) -> np.ndarray:
+        """(rows, columns): `values` (X,) on the map, `fill` where there is no state."""
+        laid = np.full(self.shape, fill)
         laid.flat[self.places] = values
         return laid
 

@@ -9,7 +9,8 @@ is a mapping of arrays, M methods with S learners each, after k batches of episo
     lengths (M,)               transitions of an episode, the mean of the last batch
     episodes (k,)              each learner's episodes so far
     online (M, S, k)           mean discounted cost of a batch's episodes: what learning cost
-    offline (M, S, k)          cost of the greedy policy after it: what was learned
+    offline (M, S, k)          cost of the greedy policy after it: what was learned; where neither
+                               luck nor gamma = 1 forbids it without end, else of cut episodes
     off, most (M, S, k)        root mean square and largest of |Q - Q*|
 """
 
@@ -18,6 +19,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from labs.algorithms.exploration import Behavior
+from labs.algorithms.policy_evaluation import exact
 from labs.algorithms.sarsa_lambda import FAINT
 from labs.algorithms.td_control import SARSA_LAMBDA, Learners, greedy_costs, init, step
 from labs.problems.episodes import Rule
@@ -72,7 +74,7 @@ def further(
     errors = np.array([[task.errors(q) for q in learners.q] for learners in after])
     points = {
         "online": np.array([learners.costs.mean(axis=1) for learners in after]),
-        "offline": np.array([greedy_costs(task.trial, learners, trials) for learners in after]),
+        "offline": np.array([_offline(task, learners, trials) for learners in after]),
         "off": errors[..., 0],
         "most": errors[..., 1],
     }
@@ -89,6 +91,15 @@ def further(
         name: np.concatenate([training[name], point[..., None]], axis=2)[..., -KEPT:]
         for name, point in points.items()
     }
+
+
+def _offline(task: Task, learners: Learners, trials: int) -> np.ndarray:
+    """(S,) from the start. An episode that is cut costs less than the policy does, and may cost
+    less than the best."""
+    if task.mdp.deterministic and task.mdp.gamma < 1.0:
+        policies = learners.q.argmin(axis=2)
+        return np.array([exact(task.mdp, policy)[task.start] for policy in policies])
+    return greedy_costs(task.trial, learners, trials)
 
 
 def batch(task: Task, rule: Rule, methods: Sequence[int], training: Training, most: int) -> int:

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from labs.engine.catalog import find
 from labs.engine.headless import run
@@ -13,12 +14,13 @@ from labs.engine.run import World
 from labs.errors import LabError
 from labs.params import Value
 from labs.reinforcement_learning.dynamic_programming.params import DynamicProgrammingParams
-from labs.reinforcement_learning.dynamic_programming.picture import board
+from labs.reinforcement_learning.dynamic_programming.picture import NO_VALUE, board
 from labs.reinforcement_learning.dynamic_programming.problems import (
     finite_horizon,
     problem,
     rollout,
 )
+from labs.rounding import rounded_up
 from labs.scene import NullScene, cell_centers
 from labs.tasks.grid_world.map import MAPS, GridWorld
 from labs.tasks.pendulum_table.table import PendulumGrid
@@ -207,7 +209,7 @@ def test_four_iterations_from_one_seed_reach_their_limits() -> None:
     bound = one.lab.fields(one.params, one.state)
     assert (bound["error_value"] <= bound["bound"] + 1e-9).all()
     assert one.latest is not None
-    assert one.latest.done == "All four iterations have converged."
+    assert one.latest.done.startswith("All four iterations have converged: the largest distance ")
     assert one.latest.progress == 1.0
 
 
@@ -269,6 +271,70 @@ def test_what_has_no_limit_is_not_begun_and_says_why() -> None:
     assert (solved({"map": sealed, "gamma": 1.0}).state.standing.count > 0).all()
     swinging = solved({"world": "pendulum", "gamma": 1.0, "nodes": 31})
     assert (swinging.state.standing.count > 0).tolist() == [False, False, True, True]
+
+
+class BoardColors(NullScene):
+    """Of the cells drawn."""
+
+    colors: np.ndarray
+
+    def cells(
+        self,
+        name: str,
+        origin: ArrayLike,
+        size: float,
+        colors: np.ndarray,
+        *,
+        clickable: bool = True,
+    ) -> None:
+        self.colors = colors
+
+
+@pytest.mark.parametrize("shown", ["evaluation", "policy", "modified", "value"])
+def test_what_has_no_value_is_left_out(shown: str) -> None:
+    world = solved({"map": "S.#G", "gamma": 1.0, "shown": shown})
+    for _ in range(200):
+        world.advance()
+    measured = world.lab.measure(world.params, world.state)
+    assert not {"at_start", "promised", "error", "angle", "torque"} & set(measured)
+    assert np.isnan(world.recording().channels["at_start"]).all()
+    fields = world.lab.fields(world.params, world.state)
+    assert np.isnan(fields["V"]).all()
+    for name in ("stationary", f"error_{shown}", f"backups_{shown}", "bound"):
+        assert len(fields[name]) == 0, name
+    scene = BoardColors()
+    world.lab.draw(scene, world.params, world.state)
+    assert (scene.colors[0, :2] == NO_VALUE).all()
+
+
+def test_cells_without_a_state_have_no_value_and_all_others_do() -> None:
+    world = solved({"map": "S.#\n..G"})
+    fields = world.lab.fields(world.params, world.state)
+    wall = [[False, False, False], [False, False, True]]
+    np.testing.assert_array_equal(np.isnan(fields["V"]), wall)
+    np.testing.assert_array_equal(np.isnan(fields["control"]), wall)
+    measured = world.lab.measure(world.params, world.state)
+    assert measured["at_start"] == pytest.approx(1 + 0.95 + 0.95**2)
+    assert measured["error"] < 1e-6
+
+
+def test_without_discount_a_small_change_is_no_convergence() -> None:
+    """A wanderer on 15 x 15 cells: the iteration stops with an error of 142."""
+    open_field = "\n".join(["S" + 14 * ".", *13 * [15 * "."], 14 * "." + "G"])
+    world = solved({"map": open_field, "gamma": 1.0, "tolerance": 0.1})
+    error = world.state.standing.errors[-1, 0]
+    assert error > 100.0
+    assert world.latest is not None
+    assert world.latest.done == (
+        "All four iterations have stopped; with gamma = 1 that bounds no distance to the limit: "
+        f"the largest distance left is {rounded_up(error)}."
+    )
+    assert float(rounded_up(error)) >= error
+    lines = world.lab.notes(world.params, world.state)["account"].splitlines()
+    assert lines[0].endswith(
+        "by more than 0.1; with gamma = 1 that bounds no distance to the limit."
+    )
+    assert lines[3].endswith("The last sweep changed no value.")
 
 
 # In the scene ---------------------------------------------------------------------------------

@@ -59,7 +59,7 @@ def acceleration(q: np.ndarray, v: np.ndarray, tau: np.ndarray, friction: float)
     )
 
 
-def advance(
+def integrate(
     q: np.ndarray, v: np.ndarray, tau: np.ndarray, friction: float, dt: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """q and v (..., n) a time dt [s] later under held torques."""
@@ -178,7 +178,7 @@ class PendulumGrid:
             part = slice(begin, min(begin + chunk, self.X))
             q, v = np.split(self.nodes[part], 2, axis=1)
             columns = [
-                self.state(*advance(q, v, np.broadcast_to(tau, q.shape), self.friction, self.dt))
+                self.state(*integrate(q, v, np.broadcast_to(tau, q.shape), self.friction, self.dt))
                 for tau in self.torques
             ]
             yield part, np.stack(columns, axis=1)

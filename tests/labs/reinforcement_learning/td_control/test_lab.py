@@ -15,12 +15,12 @@ from labs.engine.run import World
 from labs.errors import ParameterError
 from labs.lab import Snapshot
 from labs.params import Value
-from labs.reinforcement_learning.td_control.lab import TdControl, TdParams, TdState
-from labs.reinforcement_learning.td_control.params import BATCHES
-from labs.reinforcement_learning.td_control.picture import CELL, board
-from labs.reinforcement_learning.td_control.training import further
-from labs.scene import NullScene, cell_centers
-from labs.tasks.grid_world.map import MAPS
+from labs.reinforcement_learning.td_control.lab import TdControl, TdState
+from labs.reinforcement_learning.td_control.params import BATCHES, TdParams
+from labs.reinforcement_learning.td_control.training import train
+from labs.scene import NullScene
+from labs.tasks.grid_world.map import MAPS, GridWorld
+from labs.tasks.grid_world.picture import board
 from tests.labs.experiments import Experiments
 
 EXPERIMENTS = Experiments("labs.reinforcement_learning", "td_control")
@@ -166,8 +166,7 @@ def test_a_goal_close_by_is_found_at_once(setting: Mapping[str, Value]) -> None:
 
 def clicked(world: World, cell: tuple[int, int]) -> World:
     """The world after a click in the middle of a cell."""
-    shape = params_of(world).world.shape
-    x, y, z = cell_centers(board(shape), CELL, *shape)[cell]
+    x, y, z = board(GridWorld.parse(params_of(world).map)).centers[cell]
     world.hold("board", (float(x), float(y), float(z)))
     return world
 
@@ -280,8 +279,7 @@ def test_clicks_that_mean_nothing_change_nothing_or_say_why() -> None:
     params = TdParams(brush="#")
     assert LAB.edit(params, "board", (9.0, 9.0, 0.0)) == {}
     assert LAB.edit(params, "policy", (0.0, 0.0, 0.0)) == {}
-    shape = params.world.shape
-    x, y, z = cell_centers(board(shape), CELL, *shape)[3, 11]
+    x, y, z = board(GridWorld.parse(params.map)).centers[3, 11]
     with pytest.raises(ParameterError, match="no goal"):
         LAB.edit(params, "board", (float(x), float(y), float(z)))
 
@@ -331,8 +329,8 @@ def test_the_best_policy_costs_the_optimum_and_not_what_an_episode_of_it_costs()
     state, task = LAB.init(params, np.random.default_rng(0)), params.task
     q = -np.eye(task.mdp.U)[task.q_star.argmin(axis=1)]
     knowing = {**state.training, "q": np.tile(q, (1, 5, 1, 1))}
-    rule = params.rule(task)._replace(alpha=0.0)
-    training = further(task, params.behavior(task), rule, params.kinds, knowing, 1)
+    rule = params.rule._replace(alpha=0.0)
+    training = train(task, params.behaviour, rule, params.kinds, knowing, 1)
     measured = LAB.measure(params, replace(state, training=training))
     assert measured["greedy_first"] == pytest.approx(12.737, abs=1e-3)
     assert measured["greedy_first"] == pytest.approx(measured["optimum"], rel=1e-12)

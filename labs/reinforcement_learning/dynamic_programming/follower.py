@@ -41,16 +41,18 @@ class Follower:
     """Periods left until it starts anew."""
 
 
-def start(task: TabularTask, draws: int = 0) -> Follower:
+def start_follower(task: TabularTask, draws: int = 0) -> Follower:
     """At the start."""
     return Follower(_start(task), draws)
 
 
-def follow(task: TabularTask, follower: Follower, policy: np.ndarray | None, seed: int) -> Follower:
+def follow_policy(
+    task: TabularTask, follower: Follower, policy: np.ndarray | None, seed: int
+) -> Follower:
     """One PERIOD [s] later. `policy` (X,) says what to do at the next decision; None: nothing is
     left to do."""
     if follower.resting == 1:
-        return start(task, follower.draws)
+        return start_follower(task, follower.draws)
     if follower.resting:
         return _rest(task, follower, follower.resting - 1)
     if follower.walk.clock == 0:
@@ -77,7 +79,7 @@ def carry_over(task: TabularTask, follower: Follower) -> Follower:
         fits = is_on(place, walk)
     else:
         fits = isinstance(place, PendulumGrid) and isinstance(walk, Swing)
-    return follower if fits else start(task, follower.draws)
+    return follower if fits else start_follower(task, follower.draws)
 
 
 def _start(task: TabularTask) -> GridWalk | Swing:

@@ -14,15 +14,15 @@ from labs.reinforcement_learning.dynamic_programming.follower import (
     Follower,
     apply_push,
     carry_over,
-    follow,
-    start,
+    follow_policy,
+    start_follower,
 )
 from labs.reinforcement_learning.dynamic_programming.params import DynamicProgrammingParams
 from labs.reinforcement_learning.dynamic_programming.plots import (
     PLOTS,
     POINTS,
     horizon_curves,
-    maps,
+    table_maps,
     table_sizes,
 )
 from labs.reinforcement_learning.dynamic_programming.side_by_side import (
@@ -47,7 +47,7 @@ from labs.scene import Scene
 from labs.tasks.grid_world.map import MAPS, GridWorld, grid_world
 from labs.tasks.grid_world.params import edit_map
 from labs.tasks.grid_world.picture import draw_board, draw_walkers, draw_way
-from labs.tasks.grid_world.walk import GridWalk, rollout
+from labs.tasks.grid_world.walk import GridWalk, nominal_path
 from labs.tasks.pendulum_table.picture import draw_table
 from labs.tasks.pendulum_table.table import table_size
 
@@ -116,7 +116,7 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
             settings=params.settings,
             spread=params.spread,
             iterates=cold_start(params.task, seed, params.spread),
-            follower=start(tabular_task(params.task)),
+            follower=start_follower(tabular_task(params.task)),
         )
 
     def step(
@@ -127,7 +127,7 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
             return state
         task, follower = state.tabular_task, state.follower
         if "again" in inputs.actions:
-            follower = start(task, follower.draws)
+            follower = start_follower(task, follower.draws)
         if "push" in inputs.actions:
             follower = apply_push(task, follower, state.seed)
         policy: np.ndarray | None = state.iterates.policy[params.row]
@@ -135,7 +135,7 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
             left = int(params.to_go) - follower.walk.steps
             _, stages = finite_horizon(state.task, params.w_f)
             policy = stages[left - 1] if left > 0 else None
-        follower = follow(task, follower, policy, state.seed)
+        follower = follow_policy(task, follower, policy, state.seed)
         return replace(state, t=state.t + self.period, follower=follower)
 
     def solve(
@@ -207,7 +207,7 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         return {
             **convergence_curves(state.iterates, task.mdp.gamma, POINTS),
             **horizon_curves(task, stages, int(params.to_go)),
-            **maps(task, *_shown(params, state)),
+            **table_maps(task, *_shown(params, state)),
             **table_sizes(int(params.joints), int(params.cuts)),
         }
 
@@ -236,10 +236,10 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         if policy is not None and policy[0] == RANDOM:
             policy = unpack_policy(task.mdp, policy)
         draw_board(scene, task.place, V, high, policy, relief=True)
-        draw_way(scene, task.place, rollout(task.place, task.solution[1]), 1)
+        draw_way(scene, task.place, nominal_path(task.place, task.solution[1]), 1)
         if finite:
             _, policies = finite_horizon(state.task, params.w_f)
-            draw_way(scene, task.place, rollout(task.place, policies[: int(params.to_go)]), 0)
+            draw_way(scene, task.place, nominal_path(task.place, policies[: int(params.to_go)]), 0)
         draw_walkers(scene, task.place, walk)
 
 

@@ -108,7 +108,9 @@ def horizon_curves(task: TabularTask, stages: np.ndarray, to_go: int) -> dict[st
     }
 
 
-def maps(task: TabularTask, V: np.ndarray, policy: np.ndarray | None) -> dict[str, np.ndarray]:
+def table_maps(
+    task: TabularTask, V: np.ndarray, policy: np.ndarray | None
+) -> dict[str, np.ndarray]:
     """V (X,) and a policy (X,), if any, seen from above: NaN where there is none."""
     place = task.place
     controls = np.full(task.mdp.X, np.nan) if policy is None else policy.astype(float)

@@ -28,9 +28,9 @@ ITERATION_METHODS = {
     "modified": "Modified policy iteration",
     "value": "Value iteration",
 }
-SINGLE, SHARE, LARGEST = 60, 20, 100
-"""Sweeps made one a pass; after those a pass makes one for each SHARE made so far, at most LARGEST
-and ..."""
+SINGLE_SWEEPS, SHARE, MAX_BATCH = 60, 20, 100
+"""Sweeps made one a pass; after those a pass makes one for each SHARE made so far, at most
+MAX_BATCH and ..."""
 BACKUPS = 500_000
 """... no more than about as many as take so many backups in each method."""
 MAX_SWEEPS = 10_000
@@ -145,7 +145,8 @@ def _pass(
     mdp: FiniteMDP, at: Iterates, settings: IterationSettings, limits: np.ndarray
 ) -> tuple[Iterates, np.ndarray]:
     made = len(at.errors) - 1
-    sweeps = 1 if made < SINGLE else min(made // SHARE, LARGEST, max(1, BACKUPS // (mdp.X * mdp.U)))
+    affordable = max(1, BACKUPS // (mdp.X * mdp.U))
+    sweeps = 1 if made < SINGLE_SWEEPS else min(made // SHARE, MAX_BATCH, affordable)
     sweeps = min(sweeps, MAX_SWEEPS - made)
     errors = np.vstack([at.errors, np.tile(at.errors[-1], (sweeps, 1))])
     backups = np.vstack([at.backups, np.tile(at.backups[-1], (sweeps, 1))])

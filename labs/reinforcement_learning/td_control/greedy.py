@@ -19,14 +19,14 @@ REST = 5
 """Decisions that walkers rest at the goal."""
 
 
-def start(task: LearningTask, many: int) -> GridWalk | Swing:
+def start_greedy_walk(task: LearningTask, many: int) -> GridWalk | Swing:
     """All at the start, before the first decision."""
     if isinstance(task.place, GridWorld):
         return start_walk(task.place, MOVE, many)
     return start_swing(many)
 
 
-def follow(
+def follow_greedy_policies(
     task: LearningTask, policies: np.ndarray, walk: GridWalk | Swing, random: np.ndarray
 ) -> GridWalk | Swing:
     """One PERIOD later. `policies` (M, X) holds each one's controls; `random` (4,) uint64, of the

@@ -11,7 +11,7 @@ from labs.params import Value
 from labs.random_numbers import seeded
 from labs.reinforcement_learning.td_control import greedy
 from labs.reinforcement_learning.td_control.params import BATCHES, LEARNING_METHODS, TdParams
-from labs.reinforcement_learning.td_control.plots import ORDER, PLOTS, learning_curves, maps
+from labs.reinforcement_learning.td_control.plots import ORDER, PLOTS, learner_maps, learning_curves
 from labs.reinforcement_learning.td_control.tasks import LearningTask
 from labs.reinforcement_learning.td_control.training import (
     Training,
@@ -26,7 +26,7 @@ from labs.scene import Scene
 from labs.tasks.grid_world.map import MAPS, GridWorld, grid_world
 from labs.tasks.grid_world.params import edit_map
 from labs.tasks.grid_world.picture import draw_board, draw_walkers, draw_way
-from labs.tasks.grid_world.walk import GridWalk, rollout
+from labs.tasks.grid_world.walk import GridWalk, nominal_path
 from labs.tasks.pendulum_table.picture import draw_table
 from labs.tasks.pendulum_table.swing import Swing
 
@@ -82,7 +82,9 @@ class TdControl(Lab[TdParams, TdState]):
     def init(self, params: TdParams, rng: np.random.Generator) -> TdState:
         task, many = params.task, len(params.methods)
         training = initial_training(task, many, params.learners, rng, params.q0)
-        return TdState(training=training, walk=greedy.start(task, many), random=seeded(rng, 1)[0])
+        return TdState(
+            training=training, walk=greedy.start_greedy_walk(task, many), random=seeded(rng, 1)[0]
+        )
 
     def step(self, params: TdParams, inputs: Inputs, state: TdState) -> TdState:
         """10 ms of the walk under the greedy policies of the moment."""
@@ -91,7 +93,7 @@ class TdControl(Lab[TdParams, TdState]):
         _, s = params.view
         policies = _current(params, state)["q"][:, s].argmin(axis=2)
         random = state.random.copy()
-        walk = greedy.follow(params.task, policies, state.walk, random)
+        walk = greedy.follow_greedy_policies(params.task, policies, state.walk, random)
         return replace(state, t=state.t + self.period, walk=walk, random=random)
 
     def solve(self, params: TdParams, state: TdState) -> Iterator[Snapshot]:
@@ -146,7 +148,7 @@ class TdControl(Lab[TdParams, TdState]):
     def fields(self, params: TdParams, state: TdState) -> Mapping[str, np.ndarray]:
         task, training, (m, s) = params.task, _current(params, state), params.view
         control = min(round(params.control), task.mdp.U)
-        shown = maps(task, training["q"][m, s], training["visits"][m, s], control)
+        shown = learner_maps(task, training["q"][m, s], training["visits"][m, s], control)
         return shown | learning_curves(task, training)
 
     def draw(self, scene: Scene, params: TdParams, state: TdState) -> None:
@@ -162,7 +164,7 @@ class TdControl(Lab[TdParams, TdState]):
         assert isinstance(task.place, GridWorld)
         draw_board(scene, task.place, V, _dearest(task, V), policy, known=known)
         for i, q in enumerate(tables):
-            draw_way(scene, task.place, rollout(task.place, q.argmin(axis=1)), i)
+            draw_way(scene, task.place, nominal_path(task.place, q.argmin(axis=1)), i)
         draw_walkers(scene, task.place, state.walk)
 
     @classmethod

@@ -42,7 +42,7 @@ PLOTS: tuple[Plot, ...] = (
 )
 
 
-def maps(
+def learner_maps(
     task: LearningTask, q: np.ndarray, visits: np.ndarray, control: int
 ) -> dict[str, np.ndarray]:
     """Of one learner's Q and visits, both (X, U), seen from above, row 0 on top: NaN where there is

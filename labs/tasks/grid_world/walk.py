@@ -89,7 +89,7 @@ def _next_state(mdp: FiniteMDP, x: int, u: int, random: Callable[[], float]) -> 
     return int(np.searchsorted(mdp.cumulative[u, x], random(), side="right"))
 
 
-def rollout(world: GridWorld, policies: np.ndarray | Sequence[np.ndarray]) -> np.ndarray:
+def nominal_path(world: GridWorld, policies: np.ndarray | Sequence[np.ndarray]) -> np.ndarray:
     """(k, 2) cells from the start on, were nothing left to chance: under one policy (X,) to a goal
     or to where the way comes again; or, from N steps to go down to 1, under policies (N, X) by
     the steps to go less one."""

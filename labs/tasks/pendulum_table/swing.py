@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labs.problems.finite_mdp import FiniteMDP
-from labs.tasks.pendulum_table.table import PendulumGrid, integrate
+from labs.tasks.pendulum_table.table import PendulumGrid, integrate_pendulum
 
 PATH = 300
 """States kept of a motion."""
@@ -73,7 +73,9 @@ def push(swing: Swing, change: float) -> Swing:
 
 
 def _integrated(grid: PendulumGrid, swing: Swing, period: float, clock: int) -> Swing:
-    q, v = integrate(swing.at[:, :1], swing.at[:, 1:], swing.torque[:, None], grid.friction, period)
+    q, v = integrate_pendulum(
+        swing.at[:, :1], swing.at[:, 1:], swing.torque[:, None], grid.friction, period
+    )
     at = np.concatenate([q, v], axis=1)
     path = np.concatenate([swing.path, at[None]])[-PATH:]
     return replace(swing, at=at, to=swing.to if clock else at, path=path, clock=clock)

@@ -19,7 +19,7 @@ from labs.rounding import rounded_up
 from labs.scene import NullScene
 from labs.tasks.grid_world.map import MAPS, GridWorld
 from labs.tasks.grid_world.picture import NO_VALUE, board
-from labs.tasks.grid_world.walk import rollout
+from labs.tasks.grid_world.walk import nominal_path
 from labs.tasks.pendulum_table.table import PendulumGrid
 from tests.labs.experiments import Experiments
 
@@ -53,7 +53,7 @@ def finite_way(world: World, steps: int) -> np.ndarray:
     place = world.state.tabular_task.place
     assert isinstance(place, GridWorld)
     _, policies = finite_horizon(world.state.task, params_of(world).w_f)
-    return rollout(place, policies[:steps])
+    return nominal_path(place, policies[:steps])
 
 
 @ARTICLE.verify("Little time left")
@@ -112,7 +112,7 @@ def test_who_may_slip_keeps_off_the_edge(setting: Setting) -> None:
     def rows(slip: float) -> tuple[int, set[int]]:
         """Steps of the way meant, and the rows it visits between its ends."""
         task = solved({**setting, "slip": slip}).state.tabular_task
-        cells = rollout(task.place, task.solution[1])
+        cells = nominal_path(task.place, task.solution[1])
         along = cells[(cells[:, 1] > 0) & (cells[:, 1] < 11)]
         return len(cells) - 1, set(along[:, 0].tolist())
 

@@ -2,13 +2,13 @@
 
 import pytest
 
-from labs.reinforcement_learning.markov.chains import table_of
+from labs.reinforcement_learning.markov.chains import chain_table
 from labs.reinforcement_learning.markov.description import about_chain, about_value
 from labs.reinforcement_learning.markov.reward_process import Edit, RewardProcess, reward_process
 
 
 def process(name: str, first: float = 1.0, own: str = "state, A\nA, 1") -> RewardProcess:
-    return reward_process(table_of(name, 1, own), first, Edit({}, 0, 0, 0.0))
+    return reward_process(chain_table(name, 1, own), first, Edit({}, 0, 0, 0.0))
 
 
 @pytest.mark.parametrize(

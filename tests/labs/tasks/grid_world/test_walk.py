@@ -12,7 +12,7 @@ from labs.tasks.grid_world.walk import (
     advance_walk,
     choose_steps,
     is_on,
-    rollout,
+    nominal_path,
     start_walk,
 )
 
@@ -103,21 +103,21 @@ def test_a_long_walk_keeps_the_end_of_its_path_and_leaves_the_old_walk_alone() -
 def test_a_rollout_ends_at_a_goal_or_where_it_comes_again() -> None:
     world = GridWorld.parse(MAPS["cliff"])
     policy = np.full(len(world.cells), RIGHT)
-    assert rollout(world, policy).tolist() == [[3, 0]], "off the cliff, and back at the start"
+    assert nominal_path(world, policy).tolist() == [[3, 0]], "off the cliff, and back at the start"
     policy[world.state((3, 0))] = UP
     policy[world.state((2, 11))] = DOWN
-    way = rollout(world, policy).tolist()
+    way = nominal_path(world, policy).tolist()
     assert way == [[3, 0], *([2, c] for c in range(12)), [3, 11]]
     policy[world.state((2, 5))] = LEFT
-    assert rollout(world, policy).tolist() == way[:7], "to and fro"
+    assert nominal_path(world, policy).tolist() == way[:7], "to and fro"
 
 
 def test_a_rollout_of_a_finite_horizon_takes_the_policy_of_each_time() -> None:
     world = GridWorld.parse("S..G\n....")
     ways = np.array([constant(world, u)[0] for u in (DOWN, RIGHT, RIGHT)])
-    assert rollout(world, ways).tolist() == [[0, 0], [0, 1], [0, 2], [1, 2]]
-    assert rollout(world, ways[:0]).tolist() == [[0, 0]]
-    assert len(rollout(world, np.array([constant(world, UP)[0]] * 9))) == 10, "may come again"
+    assert nominal_path(world, ways).tolist() == [[0, 0], [0, 1], [0, 2], [1, 2]]
+    assert nominal_path(world, ways[:0]).tolist() == [[0, 0]]
+    assert len(nominal_path(world, np.array([constant(world, UP)[0]] * 9))) == 10, "may come again"
 
 
 @pytest.mark.parametrize("cell", [(-1, 0), (0, -1), (2, 0), (0, 4), (1, 1)])

@@ -11,7 +11,7 @@ from labs.tasks.pendulum_table.swing import (
     push,
     start_swing,
 )
-from labs.tasks.pendulum_table.table import PendulumGrid, integrate
+from labs.tasks.pendulum_table.table import PendulumGrid, integrate_pendulum
 
 GRID = PendulumGrid(q_nodes=21, v_nodes=21, levels=3)
 MDP = GRID.mdp(0.9)
@@ -33,7 +33,7 @@ def test_a_torque_is_held_for_a_time_step_of_the_equation_of_motion() -> None:
     assert (swing.steps, swing.clock, swing.torque[0]) == (1, 0, GRID.torque)
     q = v = np.zeros(1)
     for _ in range(10):
-        q, v = integrate(q, v, np.array([GRID.torque]), GRID.friction, PERIOD)
+        q, v = integrate_pendulum(q, v, np.array([GRID.torque]), GRID.friction, PERIOD)
     np.testing.assert_allclose(swing.at[0], [*q, *v], rtol=1e-12)
     assert swing.path.shape == (11, 1, 2)
 

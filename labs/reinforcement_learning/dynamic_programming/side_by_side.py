@@ -167,7 +167,7 @@ def _pass(
         ends.append(sweep)
     iterates = Iterates(
         V=np.stack([sweep.V for sweep in ends]),
-        policy=np.stack([pack_policy(sweep.policy) for sweep in ends]),
+        policy=np.stack([_pack_policy(sweep.policy) for sweep in ends]),
         count=np.array([sweep.count for sweep in ends]),
         held=np.array([sweep.held for sweep in ends]),
         errors=errors,
@@ -200,7 +200,7 @@ def _sweep(mdp: FiniteMDP, at: Iterates, i: int) -> Sweep:
     )
 
 
-def pack_policy(policy: np.ndarray) -> np.ndarray:
+def _pack_policy(policy: np.ndarray) -> np.ndarray:
     if policy.ndim == 2:
         return np.full(len(policy), RANDOM, np.int16)
     return policy.astype(np.int16)

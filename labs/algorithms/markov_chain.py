@@ -142,7 +142,7 @@ def absorption(P: np.ndarray, classes: list[CommunicatingClass]) -> np.ndarray:
     ends = np.zeros((len(P), len(closed)))
     for k, c in enumerate(closed):
         ends[c.states, k] = 1.0
-    transient = np.all(ends == 0.0, axis=1)
+    transient: np.ndarray = ends.sum(axis=1) == 0.0
     ends[transient] = _transient_sums(P, 1.0, transient, P[transient] @ ends)
     return ends
 

@@ -98,7 +98,7 @@ def test_costs_without_discount_are_finite_where_they_are_and_exact(seed: int) -
     closed = closed_classes(P)
     costly = [x for c in closed if C[c].any() for x in c]
     hops = np.linalg.matrix_power(np.eye(len(P), dtype=bool) | (P > 0.0), len(P))
-    finite = np.all(~hops[:, costly], axis=1)
+    finite: np.ndarray = hops[:, costly].sum(axis=1) == 0
     found = cost_to_go(P, C, 1.0, communicating_classes(P))
     np.testing.assert_array_equal(found.finite, finite)
     np.testing.assert_array_equal(np.isfinite(found.known), finite)

@@ -25,7 +25,7 @@ from labs.random_numbers import below, uniform
 EPSILON_GREEDY, BOLTZMANN, CONFIDENCE, FOLLOW = range(4)
 
 
-class Behavior(NamedTuple):
+class BehaviourPolicy(NamedTuple):
     """How controls are chosen while learning."""
 
     kind: int = EPSILON_GREEDY
@@ -42,17 +42,19 @@ class Behavior(NamedTuple):
 
 
 @copied
-def choose(behavior: Behavior, x: int, q: np.ndarray, visits: np.ndarray, state: np.ndarray) -> int:
+def choose(
+    behaviour: BehaviourPolicy, x: int, q: np.ndarray, visits: np.ndarray, random: np.ndarray
+) -> int:
     """The control to try in state x, from Q and N, both (X, U)."""
-    if behavior.kind != EPSILON_GREEDY or behavior.decay > 0.0:
-        return _otherwise(behavior, x, q, visits, state)
-    if uniform(state) < behavior.epsilon:
-        return below(state, q.shape[1])
-    return greedy(q, x, state)
+    if behaviour.kind != EPSILON_GREEDY or behaviour.decay > 0.0:
+        return _choose_otherwise(behaviour, x, q, visits, random)
+    if uniform(random) < behaviour.epsilon:
+        return below(random, q.shape[1])
+    return greedy(q, x, random)
 
 
 @compiled
-def greedy(q: np.ndarray, x: int, state: np.ndarray) -> int:
+def greedy(q: np.ndarray, x: int, random: np.ndarray) -> int:
     """The control of least Q(x, u); among equals, any."""
     least, best, ties = q[x, 0], 0, 1
     for u in range(1, q.shape[1]):
@@ -61,17 +63,17 @@ def greedy(q: np.ndarray, x: int, state: np.ndarray) -> int:
             least, best, ties = cost, u, 1
         elif cost == least:
             ties += 1
-    return best if ties == 1 else _among_equals(q, x, best, ties, state)
+    return best if ties == 1 else _break_tie(q, x, best, ties, random)
 
 
 @compiled
-def boltzmann(costs: np.ndarray, beta: float, state: np.ndarray) -> int:
+def boltzmann(costs: np.ndarray, beta: float, random: np.ndarray) -> int:
     """A control with probability proportional to exp(-beta cost). Costs (U,) count from the least
     one, so that nothing overflows."""
     least, total = costs.min(), 0.0
     for cost in costs:
         total += np.exp(-beta * (cost - least))
-    left = uniform(state) * total
+    left = uniform(random) * total
     for u in range(len(costs)):
         left -= np.exp(-beta * (costs[u] - least))
         if left < 0.0:
@@ -80,7 +82,7 @@ def boltzmann(costs: np.ndarray, beta: float, state: np.ndarray) -> int:
 
 
 @compiled
-def confidence(costs: np.ndarray, visits: np.ndarray, bound: float, state: np.ndarray) -> int:
+def confidence(costs: np.ndarray, visits: np.ndarray, bound: float, random: np.ndarray) -> int:
     """The control of the lowest confidence bound; an untried one comes before all others. Costs
     and visits are (U,)."""
     scores = np.empty((1, len(costs)))
@@ -90,27 +92,27 @@ def confidence(costs: np.ndarray, visits: np.ndarray, bound: float, state: np.nd
             scores[0, u] = -np.inf
         else:
             scores[0, u] = costs[u] - bound * np.sqrt(logarithm / visits[u])
-    return greedy(scores, 0, state)
+    return greedy(scores, 0, random)
 
 
 @compiled
-def _otherwise(
-    behavior: Behavior, x: int, q: np.ndarray, visits: np.ndarray, state: np.ndarray
+def _choose_otherwise(
+    behaviour: BehaviourPolicy, x: int, q: np.ndarray, visits: np.ndarray, random: np.ndarray
 ) -> int:
     """Whatever is not epsilon-greedy with a constant epsilon."""
-    if behavior.kind == CONFIDENCE:
-        return confidence(q[x], visits[x], behavior.bound, state)
-    n = 1.0 + visits[x].sum() if behavior.decay > 0.0 else 1.0
-    if behavior.kind == BOLTZMANN:
-        return boltzmann(q[x], behavior.beta * (1.0 + np.log(n)), state)
-    if uniform(state) < behavior.epsilon * n**-behavior.decay:
-        return below(state, q.shape[1])
-    return int(behavior.policy[x]) if behavior.kind == FOLLOW else greedy(q, x, state)
+    if behaviour.kind == CONFIDENCE:
+        return confidence(q[x], visits[x], behaviour.bound, random)
+    n = 1.0 + visits[x].sum() if behaviour.decay > 0.0 else 1.0
+    if behaviour.kind == BOLTZMANN:
+        return boltzmann(q[x], behaviour.beta * (1.0 + np.log(n)), random)
+    if uniform(random) < behaviour.epsilon * n**-behaviour.decay:
+        return below(random, q.shape[1])
+    return int(behaviour.policy[x]) if behaviour.kind == FOLLOW else greedy(q, x, random)
 
 
 @compiled
-def _among_equals(q: np.ndarray, x: int, best: int, ties: int, state: np.ndarray) -> int:
-    skip = below(state, ties)
+def _break_tie(q: np.ndarray, x: int, best: int, ties: int, random: np.ndarray) -> int:
+    skip = below(random, ties)
     for u in range(best, q.shape[1]):
         if q[x, u] == q[x, best]:
             if skip == 0:

@@ -31,7 +31,7 @@ TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Class:
+class CommunicatingClass:
     """States that lead to one another."""
 
     states: np.ndarray
@@ -57,12 +57,14 @@ class CostToGo:
         return np.where(self.finite, self.V, np.nan)
 
 
-def communicating_classes(P: np.ndarray) -> list[Class]:
+def communicating_classes(P: np.ndarray) -> list[CommunicatingClass]:
     """The classes of P, by their first states."""
     _, label = connected_components(P > 0.0, connection="strong")
     groups = [np.flatnonzero(label == k) for k in range(label.max() + 1)]
     return [
-        Class(states, not np.delete(P[states], states, axis=1).any(), _period(P, states))
+        CommunicatingClass(
+            states, not np.delete(P[states], states, axis=1).any(), _period(P, states)
+        )
         for states in sorted(groups, key=lambda states: int(states[0]))
     ]
 
@@ -82,12 +84,12 @@ def _period(P: np.ndarray, states: np.ndarray) -> int:
     return int(np.gcd.reduce(level[start] + 1 - level[end])) if len(start) else 0
 
 
-def is_irreducible(classes: list[Class]) -> bool:
+def is_irreducible(classes: list[CommunicatingClass]) -> bool:
     """Whether every state leads to every other."""
     return len(classes) == 1
 
 
-def stationary(P: np.ndarray, closed: Class) -> np.ndarray:
+def stationary_distribution(P: np.ndarray, closed: CommunicatingClass) -> np.ndarray:
     """pi (X,), the only stationary distribution that lives on a closed class: elimination
     without any subtraction (Grassmann, Taksar and Heyman 1985), exact to rounding in each entry."""
     A = P[np.ix_(closed.states, closed.states)].copy()
@@ -132,7 +134,7 @@ def _transient_sums(P: np.ndarray, gamma: float, inside: np.ndarray, B: np.ndarr
     return B
 
 
-def absorption(P: np.ndarray, classes: list[Class]) -> np.ndarray:
+def absorption(P: np.ndarray, classes: list[CommunicatingClass]) -> np.ndarray:
     """(X, K) probabilities of ending in each of the K closed classes, by the state of the start:
     B = (I - P_TT)^-1 P_TR for the transient states T, those of classes that are not closed. 0 is
     what no way leads to."""
@@ -140,15 +142,15 @@ def absorption(P: np.ndarray, classes: list[Class]) -> np.ndarray:
     ends = np.zeros((len(P), len(closed)))
     for k, c in enumerate(closed):
         ends[c.states, k] = 1.0
-    transient = ~ends.any(axis=1)
+    transient: np.ndarray = ends.sum(axis=1) == 0.0
     ends[transient] = _transient_sums(P, 1.0, transient, P[transient] @ ends)
     return ends
 
 
-def long_run(P: np.ndarray, classes: list[Class]) -> np.ndarray:
+def long_run(P: np.ndarray, classes: list[CommunicatingClass]) -> np.ndarray:
     """(X, X), in row x the share of time spent in each state in the long run by one who starts
     in x: the limit of (I + P + ... + P^(n-1)) / n, which exists for every P."""
-    shares = np.stack([stationary(P, c) for c in classes if c.closed])
+    shares = np.stack([stationary_distribution(P, c) for c in classes if c.closed])
     mixed: np.ndarray = absorption(P, classes) @ shares
     return mixed
 
@@ -161,7 +163,9 @@ def eigenvalues(P: np.ndarray) -> np.ndarray:
     return ordered
 
 
-def cost_to_go(P: np.ndarray, C: np.ndarray, gamma: float, classes: list[Class]) -> CostToGo:
+def cost_to_go(
+    P: np.ndarray, C: np.ndarray, gamma: float, classes: list[CommunicatingClass]
+) -> CostToGo:
     """V (X,) = (I - gamma P)^-1 C, gamma in [0, 1]; see the top for gamma = 1. Where C >= 0,
     every entry is exact to rounding."""
     finite, left = np.ones(len(P), bool), np.ones(len(P), bool)
@@ -181,7 +185,7 @@ def cost_to_go(P: np.ndarray, C: np.ndarray, gamma: float, classes: list[Class])
 
 
 def mean_costs(
-    P: np.ndarray, C: np.ndarray, gammas: np.ndarray, classes: list[Class]
+    P: np.ndarray, C: np.ndarray, gammas: np.ndarray, classes: list[CommunicatingClass]
 ) -> np.ndarray:
     """(len(gammas), X): (1 - gamma) V, the costs ahead averaged with weights (1 - gamma) gamma^k
     that sum to 1. C itself at gamma = 0; at gamma = 1, by Abel's theorem, the mean cost of a step
@@ -196,7 +200,7 @@ def mean_costs(
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
+class ValueIterate:
     """V_k (X,), and the errors up to it."""
 
     V: np.ndarray
@@ -210,9 +214,9 @@ class Sweep:
     """In [0, 1]: of the decades of error or of the sweeps, whichever is ahead."""
 
 
-def evaluate(
+def iterate_values(
     P: np.ndarray, C: np.ndarray, gamma: float, V: np.ndarray, exact: CostToGo, most: int
-) -> Iterator[Sweep]:
+) -> Iterator[ValueIterate]:
     """V_1, V_2, ... from V_0 = `V` (X,) by V_(k+1) = C + gamma P V_k, until V is exact to
     TOLERANCE of its largest entry (of that of V_0, where V = 0) or `most` sweeps are done."""
     sums = bool(exact.finite.all())
@@ -230,7 +234,9 @@ def evaluate(
             done = f"Stopped at k = {k}: {left}."
         elif sums and gap > goal:
             progress = max(progress, float(np.log(gap / errors[-1]) / np.log(gap / goal)))
-        yield Sweep(V, np.array(errors), gap * gamma ** np.arange(len(errors)), done, progress)
+        yield ValueIterate(
+            V, np.array(errors), gap * gamma ** np.arange(len(errors)), done, progress
+        )
         if done:
             return
 

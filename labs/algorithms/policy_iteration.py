@@ -21,7 +21,7 @@ from labs.algorithms.policy_evaluation import exact
 from labs.errors import LabError
 from labs.problems.finite_mdp import FiniteMDP
 
-MOST = 10_000
+MAX_IMPROVEMENTS = 10_000
 """Improvements at most in `optimum`."""
 
 
@@ -62,11 +62,13 @@ def optimum(mdp: FiniteMDP, policy: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     """V* (X,) and an optimal policy (X,) to rounding, and the improvements it took to get there
     from `policy`, (X,) or (X, U). With gamma = 1 and random dynamics, that policy has to end from
     wherever any can; V* is infinite from where none does."""
-    for count in range(MOST):
+    for count in range(MAX_IMPROVEMENTS):
         V = exact(mdp, policy)
         with np.errstate(invalid="ignore"):  # infinite values that stay so do not change
             _, better, _ = optimal_backup(mdp, V, policy)
         if policy.ndim == 1 and (better == policy).all():
             return V, policy, count
         policy = better
-    raise LabError(f"policy iteration still changes the policy after {MOST} improvements")
+    raise LabError(
+        f"policy iteration still changes the policy after {MAX_IMPROVEMENTS} improvements"
+    )

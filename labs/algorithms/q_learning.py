@@ -4,44 +4,39 @@
 
 with Q = 0 in terminal states. Whoever chose u, the target is that of the best control in x'."""
 
-import numpy as np
-
-from labs.algorithms.exploration import Behavior, choose
+from labs.algorithms.exploration import BehaviourPolicy, choose
 from labs.compiled import compiled
-from labs.problems.episodes import Problem, Rule, begin, least, step_size, transition
+from labs.problems.episodes import (
+    EpisodicTask,
+    Learner,
+    UpdateRule,
+    initial_state,
+    least,
+    record,
+    step_size,
+    transition,
+)
 
 
 @compiled
 def q_learning(
-    problem: Problem,
-    behavior: Behavior,
-    rule: Rule,
-    q: np.ndarray,
-    visits: np.ndarray,
-    state: np.ndarray,
-    costs: np.ndarray,
-    lengths: np.ndarray,
+    task: EpisodicTask, behaviour: BehaviourPolicy, rule: UpdateRule, learner: Learner
 ) -> bool:
-    """Episodes of one learner, as many as fit into `costs` and `lengths` (k,), which they fill.
-    `q` (X, U), `visits` (X, U) and the random `state` change in place. False where an estimate
-    left the rule's limit, and with it the last episode begun."""
+    """Episodes of one learner, which changes in place: as many as its costs and lengths hold.
+    False where an estimate left the rule's limit, and with it the last episode begun."""
+    q, visits, random, costs, lengths = learner
     for k in range(len(costs)):
-        x, steps, total, discount = begin(problem, state), 0, 0.0, 1.0
-        sound = True
-        while sound and steps < problem.horizon and not problem.terminal[x]:
-            u = choose(behavior, x, q, visits, state)
-            following = transition(problem, x, u, state)
-            target = problem.cost[x, u]
-            if not problem.terminal[following]:
-                target += problem.gamma * least(q, following)
+        x, discount = initial_state(task, random), 1.0
+        while lengths[k] < task.horizon and not task.terminal[x]:
+            u = choose(behaviour, x, q, visits, random)
+            next_x = transition(task, x, u, random)
+            target = task.cost[x, u]
+            if not task.terminal[next_x]:
+                target += task.gamma * least(q, next_x)
             visits[x, u] += 1
             q[x, u] += step_size(rule, visits[x, u]) * (target - q[x, u])
-            sound = abs(q[x, u]) <= rule.limit
-            total += discount * problem.cost[x, u]
-            discount *= problem.gamma
-            steps += 1
-            x = following
-        costs[k], lengths[k] = total, steps
-        if not sound:
-            return False
+            discount = record(task, learner, k, x, u, discount)
+            if not abs(q[x, u]) <= rule.limit:
+                return False
+            x = next_x
     return True

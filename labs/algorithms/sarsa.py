@@ -12,81 +12,73 @@ an episode is cut short, the value of the pair it was cut at stands for the rest
 
 import numpy as np
 
-from labs.algorithms.exploration import Behavior, choose
+from labs.algorithms.exploration import BehaviourPolicy, choose
 from labs.compiled import compiled
-from labs.problems.episodes import Problem, Rule, begin, step_size, transition
+from labs.problems.episodes import (
+    EpisodicTask,
+    Learner,
+    UpdateRule,
+    initial_state,
+    record,
+    step_size,
+    transition,
+)
 
 
 @compiled
 def sarsa(
-    problem: Problem,
-    behavior: Behavior,
-    rule: Rule,
-    q: np.ndarray,
-    visits: np.ndarray,
-    state: np.ndarray,
-    costs: np.ndarray,
-    lengths: np.ndarray,
+    task: EpisodicTask, behaviour: BehaviourPolicy, rule: UpdateRule, learner: Learner
 ) -> bool:
-    """Episodes of one learner, as many as fit into `costs` and `lengths` (k,), which they fill.
-    `q` (X, U), `visits` (X, U) and the random `state` change in place. False where an estimate
-    left the rule's limit, and with it the last episode begun."""
+    """Episodes of one learner, which changes in place: as many as its costs and lengths hold.
+    False where an estimate left the rule's limit, and with it the last episode begun."""
+    q, visits, random, costs, lengths = learner
     for k in range(len(costs)):
-        x, discount = begin(problem, state), 1.0
-        u = choose(behavior, x, q, visits, state)
-        while lengths[k] < problem.horizon and not problem.terminal[x]:
-            following = transition(problem, x, u, state)
-            target, next_u = problem.cost[x, u], 0
-            if not problem.terminal[following]:
-                next_u = choose(behavior, following, q, visits, state)
-                target += problem.gamma * q[following, next_u]
+        x, discount = initial_state(task, random), 1.0
+        u = choose(behaviour, x, q, visits, random)
+        while lengths[k] < task.horizon and not task.terminal[x]:
+            next_x = transition(task, x, u, random)
+            target, next_u = task.cost[x, u], 0
+            if not task.terminal[next_x]:
+                next_u = choose(behaviour, next_x, q, visits, random)
+                target += task.gamma * q[next_x, next_u]
             visits[x, u] += 1
             q[x, u] += step_size(rule, visits[x, u]) * (target - q[x, u])
-            costs[k] += discount * problem.cost[x, u]
-            lengths[k] += 1
-            discount *= problem.gamma
+            discount = record(task, learner, k, x, u, discount)
             if not abs(q[x, u]) <= rule.limit:
                 return False
-            x, u = following, next_u
+            x, u = next_x, next_u
     return True
 
 
 @compiled
 def sarsa_n(
-    problem: Problem,
-    behavior: Behavior,
-    rule: Rule,
-    q: np.ndarray,
-    visits: np.ndarray,
-    state: np.ndarray,
-    costs: np.ndarray,
-    lengths: np.ndarray,
+    task: EpisodicTask, behaviour: BehaviourPolicy, rule: UpdateRule, learner: Learner
 ) -> bool:
     """The same by SARSA(n)."""
-    n, gamma = rule.n, problem.gamma
+    q, visits, random, costs, _ = learner
+    n, gamma = rule.n, task.gamma
     # The last n + 1 pairs and n costs, in rings.
     xs, us = np.zeros(n + 1, np.int64), np.zeros(n + 1, np.int64)
     paid = np.zeros(n)
     for k in range(len(costs)):
-        x, t, updated, discount = begin(problem, state), 0, 0, 1.0
-        u = choose(behavior, x, q, visits, state)
+        x, t, updated, discount = initial_state(task, random), 0, 0, 1.0
+        u = choose(behaviour, x, q, visits, random)
         xs[0], us[0] = x, u
-        end = 0 if problem.terminal[x] else problem.horizon
+        end = 0 if task.terminal[x] else task.horizon
         while updated < end:
             if t < end:
-                paid[t % n] = problem.cost[x, u]
-                costs[k] += discount * problem.cost[x, u]
-                discount *= gamma
-                following, next_u = transition(problem, x, u, state), 0
-                if problem.terminal[following]:
+                paid[t % n] = task.cost[x, u]
+                discount = record(task, learner, k, x, u, discount)
+                next_x, next_u = transition(task, x, u, random), 0
+                if task.terminal[next_x]:
                     end = t + 1
                 else:
-                    next_u = choose(behavior, following, q, visits, state)
+                    next_u = choose(behaviour, next_x, q, visits, random)
                 visits[x, u] += 1
-                x, u, t = following, next_u, t + 1
+                x, u, t = next_x, next_u, t + 1
                 xs[t % (n + 1)], us[t % (n + 1)] = x, u
             if t - updated == n or t == end:
-                target = 0.0 if problem.terminal[x] else q[x, u]
+                target = 0.0 if task.terminal[x] else q[x, u]
                 for i in range(t - 1, updated - 1, -1):
                     target = paid[i % n] + gamma * target
                 then_x, then_u = xs[updated % (n + 1)], us[updated % (n + 1)]
@@ -95,5 +87,4 @@ def sarsa_n(
                 updated += 1
                 if not abs(q[then_x, then_u]) <= rule.limit:
                     return False
-        lengths[k] = t
     return True

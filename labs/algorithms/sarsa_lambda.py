@@ -12,42 +12,43 @@ then the estimates diverge. Replacing traces never exceed 1."""
 
 import numpy as np
 
-from labs.algorithms.exploration import Behavior, choose
+from labs.algorithms.exploration import BehaviourPolicy, choose
 from labs.compiled import compiled
-from labs.problems.episodes import Problem, Rule, begin, step_size, transition
+from labs.problems.episodes import (
+    EpisodicTask,
+    Learner,
+    UpdateRule,
+    initial_state,
+    record,
+    step_size,
+    transition,
+)
 
-FAINT = 1e-12
+NEGLIGIBLE_TRACE = 1e-12
 """A trace below this is over: it is beyond the digits of a float."""
 
 
 @compiled
 def sarsa_lambda(
-    problem: Problem,
-    behavior: Behavior,
-    rule: Rule,
-    q: np.ndarray,
-    visits: np.ndarray,
-    state: np.ndarray,
-    costs: np.ndarray,
-    lengths: np.ndarray,
+    task: EpisodicTask, behaviour: BehaviourPolicy, rule: UpdateRule, learner: Learner
 ) -> bool:
-    """Episodes of one learner, as many as fit into `costs` and `lengths` (k,), which they fill.
-    `q` (X, U), `visits` (X, U) and the random `state` change in place. False where an estimate
-    left the rule's limit, and with it the last episode begun."""
-    controls, fading = q.shape[1], problem.gamma * rule.decay
+    """Episodes of one learner, which changes in place: as many as its costs and lengths hold.
+    False where an estimate left the rule's limit, and with it the last episode begun."""
+    q, visits, random, costs, lengths = learner
+    controls, fading = q.shape[1], task.gamma * rule.trace_decay
     trace, traced = np.zeros(q.size), np.empty(q.size, np.int64)
     sound = True
     for k in range(len(costs)):
         many = 0  # The pairs with a trace are traced[:many], each as x U + u.
         learned = q.copy() if rule.offline else q
-        x, discount = begin(problem, state), 1.0
-        u = choose(behavior, x, q, visits, state)
-        while sound and lengths[k] < problem.horizon and not problem.terminal[x]:
-            following = transition(problem, x, u, state)
-            target, next_u = problem.cost[x, u], 0
-            if not problem.terminal[following]:
-                next_u = choose(behavior, following, q, visits, state)
-                target += problem.gamma * q[following, next_u]
+        x, discount = initial_state(task, random), 1.0
+        u = choose(behaviour, x, q, visits, random)
+        while sound and lengths[k] < task.horizon and not task.terminal[x]:
+            next_x = transition(task, x, u, random)
+            target, next_u = task.cost[x, u], 0
+            if not task.terminal[next_x]:
+                next_u = choose(behaviour, next_x, q, visits, random)
+                target += task.gamma * q[next_x, next_u]
             delta = target - q[x, u]
             visits[x, u] += 1
             pair = x * controls + u
@@ -63,16 +64,14 @@ def sarsa_lambda(
                 learned[zx, zu] += weight * delta
                 sound = sound and abs(learned[zx, zu]) <= rule.limit
                 trace[z] *= fading
-                if trace[z] < FAINT:
+                if trace[z] < NEGLIGIBLE_TRACE:
                     trace[z] = 0.0
                     many -= 1
                     traced[i] = traced[many]
                 else:
                     i += 1
-            costs[k] += discount * problem.cost[x, u]
-            lengths[k] += 1
-            discount *= problem.gamma
-            x, u = following, next_u
+            discount = record(task, learner, k, x, u, discount)
+            x, u = next_x, next_u
         q[:] = learned
         trace[traced[:many]] = 0.0
         if not sound:

@@ -9,22 +9,28 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labs.algorithms.exploration import FOLLOW, Behavior
+from labs.algorithms.exploration import FOLLOW, BehaviourPolicy
 from labs.algorithms.q_learning import q_learning
 from labs.algorithms.sarsa import sarsa, sarsa_n
 from labs.algorithms.sarsa_lambda import sarsa_lambda
 from labs.compiled import compiled
 from labs.errors import LabError
-from labs.problems.episodes import Problem, Rule, begin, transition
+from labs.problems.episodes import (
+    EpisodicTask,
+    Learner,
+    UpdateRule,
+    initial_state,
+    transition,
+)
 from labs.random_numbers import seeded
 
 Q_LEARNING, SARSA, SARSA_N, SARSA_LAMBDA = range(4)
-METHODS = (q_learning, sarsa, sarsa_n, sarsa_lambda)
+_ALGORITHMS = (q_learning, sarsa, sarsa_n, sarsa_lambda)
 
 
 @dataclass(frozen=True, eq=False)
 class Learners:
-    """S learners of one problem, who differ only in their luck."""
+    """S learners of one task, who differ only in their luck."""
 
     q: np.ndarray
     """(S, X, U) what they expect to pay."""
@@ -52,24 +58,24 @@ def init(shape: tuple[int, int], seeds: int, rng: np.random.Generator, q0: float
 
 
 def step(
-    problem: Problem,
-    behavior: Behavior,
-    rule: Rule,
+    task: EpisodicTask,
+    behaviour: BehaviourPolicy,
+    rule: UpdateRule,
     method: int,
     learners: Learners,
     episodes: int,
 ) -> Learners:
     """The learners after so many further episodes. Raises LabError where the pieces do not fit."""
-    _check(problem, behavior, rule, learners)
+    _check(task, behaviour, rule, learners)
     if not learners.sound:
         return learners
     q, visits, random = learners.q.copy(), learners.visits.copy(), learners.random.copy()
     costs = np.zeros((len(q), episodes))
     lengths = np.zeros((len(q), episodes), np.int64)
-    learn = METHODS[method]
+    learn = _ALGORITHMS[method]
     sound = all(
-        learn(problem, behavior, rule, q[s], visits[s], random[s], costs[s], lengths[s])
-        for s in range(len(q))
+        learn(task, behaviour, rule, Learner(*tables))
+        for tables in zip(q, visits, random, costs, lengths, strict=True)
     )
     return replace(
         learners, q=q, visits=visits, random=random, costs=costs, lengths=lengths, sound=sound
@@ -77,48 +83,50 @@ def step(
 
 
 @compiled
-def walk(problem: Problem, policy: np.ndarray, random: np.ndarray) -> float:
+def episode_cost(task: EpisodicTask, policy: np.ndarray, random: np.ndarray) -> float:
     """Discounted cost of an episode under `policy` (X,) int64. `random` changes in place."""
-    x, steps, total, discount = begin(problem, random), 0, 0.0, 1.0
-    while steps < problem.horizon and not problem.terminal[x]:
+    x, steps, total, discount = initial_state(task, random), 0, 0.0, 1.0
+    while steps < task.horizon and not task.terminal[x]:
         u = policy[x]
-        total += discount * problem.cost[x, u]
-        discount *= problem.gamma
+        total += discount * task.cost[x, u]
+        discount *= task.gamma
         steps += 1
-        x = transition(problem, x, u, random)
+        x = transition(task, x, u, random)
     return total
 
 
-def greedy_costs(problem: Problem, learners: Learners, trials: int = 1) -> np.ndarray:
+def greedy_costs(task: EpisodicTask, learners: Learners, trials: int = 1) -> np.ndarray:
     """(S,) what an episode under each learner's greedy policy costs, the mean of some trials. The
     luck they meet is that of the learner's next episodes, which is not used up."""
     costs = np.zeros(len(learners.q))
     for s, (q, random) in enumerate(zip(learners.q, learners.random.copy(), strict=True)):
-        costs[s] = np.mean([walk(problem, q.argmin(axis=1), random) for _ in range(trials)])
+        costs[s] = np.mean([episode_cost(task, q.argmin(axis=1), random) for _ in range(trials)])
     return costs
 
 
-def _check(problem: Problem, behavior: Behavior, rule: Rule, learners: Learners) -> None:
-    states, controls = problem.cost.shape
+def _check(
+    task: EpisodicTask, behaviour: BehaviourPolicy, rule: UpdateRule, learners: Learners
+) -> None:
+    states, controls = task.cost.shape
     if learners.q.shape[1:] != (states, controls):
         raise LabError(
-            f"the learners' Q has {learners.q.shape[1:]} states and controls, the problem "
+            f"the learners' Q has {learners.q.shape[1:]} states and controls, the task "
             f"{(states, controls)}: they must agree"
         )
-    if not len(problem.starts) or not (problem.starts < states).all():
-        raise LabError(f"starts = {problem.starts}: takes at least one state below {states}")
-    if len(behavior.policy) != (states if behavior.kind == FOLLOW else 0):
+    if not len(task.starts) or not (task.starts < states).all():
+        raise LabError(f"starts = {task.starts}: takes at least one state below {states}")
+    if len(behaviour.policy) != (states if behaviour.kind == FOLLOW else 0):
         raise LabError(
-            f"a policy of {len(behavior.policy)} controls: one for each of {states} states goes"
+            f"a policy of {len(behaviour.policy)} controls: one for each of {states} states goes"
         )
     for name, value in (
         ("alpha", rule.alpha),
         ("omega", rule.omega),
-        ("lambda", rule.decay),
-        ("epsilon", behavior.epsilon),
-        ("the decay of exploration", behavior.decay),
+        ("lambda", rule.trace_decay),
+        ("epsilon", behaviour.epsilon),
+        ("the decay of exploration", behaviour.decay),
     ):
         if not 0.0 <= value <= 1.0:
             raise LabError(f"{name} = {value}: takes a number from 0 to 1")
-    if rule.n < 1 or problem.horizon < 1:
-        raise LabError(f"n = {rule.n}, horizon = {problem.horizon}: both are whole and at least 1")
+    if rule.n < 1 or task.horizon < 1:
+        raise LabError(f"n = {rule.n}, horizon = {task.horizon}: both are whole and at least 1")

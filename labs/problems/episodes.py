@@ -1,8 +1,8 @@
 """What learning from experience consists of, for the compiled loops of model-free control.
 
-A `Problem` is a finite MDP seen from inside: a learner cannot look at its tables, it only starts
-an episode, applies a control and is told the cost and the next state. A `Rule` says how far an
-estimate moves with what it is told: the n-th update of a pair moves it by
+An `EpisodicTask` is a finite MDP seen from inside: a learner cannot look at its tables, it only
+starts an episode, applies a control and is told the cost and the next state. An `UpdateRule` says
+how far an estimate moves with what it is told: the n-th update of a pair moves it by
 
     Q(x, u) <- Q(x, u) + alpha_n delta,    alpha_n = alpha / n^omega
 
@@ -14,12 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labs.compiled import compiled
+from labs.compiled import compiled, copied
 from labs.problems.finite_mdp import FiniteMDP
 from labs.random_numbers import below, uniform
 
 
-class Problem(NamedTuple):
+class EpisodicTask(NamedTuple):
     """A finite MDP and how its episodes begin and end."""
 
     cost: np.ndarray
@@ -37,7 +37,7 @@ class Problem(NamedTuple):
     """Steps after which an episode is cut. The state there is not terminal: its value counts."""
 
 
-class Rule(NamedTuple):
+class UpdateRule(NamedTuple):
     """How estimates move."""
 
     alpha: float = 0.5
@@ -46,7 +46,7 @@ class Rule(NamedTuple):
     """In [0, 1]."""
     n: int = 1
     """Steps of SARSA(n)."""
-    decay: float = 0.0
+    trace_decay: float = 0.0
     """lambda of SARSA(lambda), in [0, 1]."""
     replacing: bool = False
     """A pair's trace is set to 1 at a visit instead of growing by 1."""
@@ -56,10 +56,25 @@ class Rule(NamedTuple):
     """An estimate beyond this magnitude diverges: the episode is broken off."""
 
 
-def problem(mdp: FiniteMDP, starts: Sequence[int], horizon: int) -> Problem:
+class Learner(NamedTuple):
+    """One that learns Q; its arrays change in place. It learns from k episodes at a time."""
+
+    q: np.ndarray
+    """(X, U) what it expects to pay."""
+    visits: np.ndarray
+    """(X, U) int32: how often each control was tried in each state."""
+    random: np.ndarray
+    """(4,) uint64: the state of its random generator."""
+    costs: np.ndarray
+    """(k,) discounted cost of each episode, from 0."""
+    lengths: np.ndarray
+    """(k,) int64: its number of transitions, from 0."""
+
+
+def episodic_task(mdp: FiniteMDP, starts: Sequence[int], horizon: int) -> EpisodicTask:
     """The episodes of an MDP that start in one of `starts`."""
     certain = mdp.deterministic
-    return Problem(
+    return EpisodicTask(
         cost=np.ascontiguousarray(mdp.C, float),
         gamma=float(mdp.gamma),
         terminal=mdp.terminal,
@@ -71,23 +86,33 @@ def problem(mdp: FiniteMDP, starts: Sequence[int], horizon: int) -> Problem:
 
 
 @compiled
-def begin(problem: Problem, state: np.ndarray) -> int:
-    """A state to start from."""
-    many = len(problem.starts)
-    return int(problem.starts[0 if many == 1 else below(state, many)])
+def initial_state(task: EpisodicTask, random: np.ndarray) -> int:
+    """A state to start from, drawn evenly."""
+    many = len(task.starts)
+    return int(task.starts[0 if many == 1 else below(random, many)])
 
 
 @compiled
-def transition(problem: Problem, x: int, u: int, state: np.ndarray) -> int:
+def transition(task: EpisodicTask, x: int, u: int, random: np.ndarray) -> int:
     """The next state."""
-    if problem.successor.size:
-        return int(problem.successor[x, u])
-    return _drawn(problem, x, u, state)
+    if task.successor.size:
+        return int(task.successor[x, u])
+    return _sample(task, x, u, random)
 
 
 @compiled
-def _drawn(problem: Problem, x: int, u: int, state: np.ndarray) -> int:
-    return int(np.searchsorted(problem.cumulative[u, x], uniform(state), "right"))
+def _sample(task: EpisodicTask, x: int, u: int, random: np.ndarray) -> int:
+    return int(np.searchsorted(task.cumulative[u, x], uniform(random), "right"))
+
+
+@copied
+def record(
+    task: EpisodicTask, learner: Learner, episode: int, x: int, u: int, discount: float
+) -> float:
+    """Adds what (x, u) costs to an episode; the discount of the cost after it."""
+    learner.costs[episode] += discount * task.cost[x, u]
+    learner.lengths[episode] += 1
+    return discount * task.gamma
 
 
 @compiled
@@ -100,11 +125,11 @@ def least(q: np.ndarray, x: int) -> float:
 
 
 @compiled
-def step_size(rule: Rule, n: int) -> float:
+def step_size(rule: UpdateRule, n: int) -> float:
     """alpha_n of a pair's n-th update."""
-    return rule.alpha if rule.omega == 0.0 else _shrunk(rule, n)
+    return rule.alpha if rule.omega == 0.0 else _decreasing(rule, n)
 
 
 @compiled
-def _shrunk(rule: Rule, n: int) -> float:
+def _decreasing(rule: UpdateRule, n: int) -> float:
     return float(rule.alpha * float(n) ** -rule.omega)

@@ -89,9 +89,11 @@ class FiniteMDP:
     @cached_property
     def cumulative(self) -> np.ndarray:
         """(U, X, X) sums of P along each row, for sampling: with r uniform in [0, 1), the next
-        state is the first y with r < cumulative[u, x, y]. The last sums are exactly 1."""
+        state is the first y with r < cumulative[u, x, y]. From the last y on that can be next
+        the sums are exactly 1."""
         sums: np.ndarray = np.cumsum(self.probabilities, axis=2)
-        sums[..., -1] = 1.0
+        last = self.X - 1 - (self.probabilities[..., ::-1] > 0.0).argmax(axis=2)
+        sums[np.arange(self.X) >= last[..., None]] = 1.0
         return sums
 
     def transition_matrix(self, policy: np.ndarray) -> np.ndarray:

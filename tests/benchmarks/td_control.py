@@ -6,12 +6,12 @@ import time
 
 import numpy as np
 
-from labs.algorithms.exploration import EPSILON_GREEDY, Behavior
+from labs.algorithms.exploration import EPSILON_GREEDY, BehaviourPolicy
 from labs.algorithms.td_control import Q_LEARNING, SARSA, SARSA_LAMBDA, SARSA_N, init, step
 from labs.engine.catalog import find
 from labs.engine.run import World
-from labs.problems.episodes import Problem, Rule
-from labs.reinforcement_learning.td_control.tasks import Task, grid_task, pendulum_task
+from labs.problems.episodes import EpisodicTask, UpdateRule
+from labs.reinforcement_learning.td_control.tasks import LearningTask, grid_task, pendulum_task
 from labs.tasks.grid_world.map import MAPS
 
 ROUNDS = 7
@@ -32,7 +32,7 @@ def q_learning_steps() -> None:
         fast, slow = [], []
         for _ in range(ROUNDS):
             fast.append(_compiled(task, Q_LEARNING, episodes))
-            slow.append(_plain(task.practice, episodes // 20))
+            slow.append(_plain(task.learning, episodes // 20))
         ratios = [f / s for f, s in zip(fast, slow, strict=True)]
         print(f"{name}: {statistics.median(fast) / 1e6:.1f} million steps a second compiled,")
         print(f"  {statistics.median(slow) / 1e6:.3f} million in plain Python,")
@@ -54,26 +54,33 @@ def q_learning_steps() -> None:
         )
 
 
-def _compiled(task: Task, method: int, episodes: int) -> float:
+def _compiled(task: LearningTask, method: int, episodes: int) -> float:
     """Transitions a second of one learner."""
     learners = init((task.mdp.X, task.mdp.U), 1, np.random.default_rng(0))
     begin = time.process_time()
-    learners = step(task.practice, Behavior(), Rule(n=4, decay=0.5), method, learners, episodes)
+    learners = step(
+        task.learning,
+        BehaviourPolicy(),
+        UpdateRule(n=4, trace_decay=0.5),
+        method,
+        learners,
+        episodes,
+    )
     return float(learners.lengths.sum()) / (time.process_time() - begin)
 
 
-def _plain(problem: Problem, episodes: int) -> float:
+def _plain(task: EpisodicTask, episodes: int) -> float:
     """The same, statement by statement, in Python, with its lists and its random numbers."""
-    cost, successor = problem.cost.tolist(), problem.successor.tolist()
-    terminal, start, gamma = problem.terminal.tolist(), int(problem.starts[0]), problem.gamma
-    behavior, rule, luck = Behavior(), Rule(), random.Random(0)
+    cost, successor = task.cost.tolist(), task.successor.tolist()
+    terminal, start, gamma = task.terminal.tolist(), int(task.starts[0]), task.gamma
+    behaviour, rule, luck = BehaviourPolicy(), UpdateRule(), random.Random(0)
     q = [[0.0] * len(row) for row in cost]
     visits = [[0] * len(row) for row in cost]
 
     def choose(x: int) -> int:
-        if behavior.kind != EPSILON_GREEDY or behavior.decay > 0.0:
+        if behaviour.kind != EPSILON_GREEDY or behaviour.decay > 0.0:
             raise NotImplementedError
-        if luck.random() < behavior.epsilon:
+        if luck.random() < behaviour.epsilon:
             return int(luck.random() * len(q[x]))
         row = q[x]
         least, best, ties = row[0], 0, 1
@@ -91,7 +98,7 @@ def _plain(problem: Problem, episodes: int) -> float:
 
     def episode() -> tuple[float, int, bool]:
         x, steps, total, discount = start, 0, 0.0, 1.0
-        while steps < problem.horizon and not terminal[x]:
+        while steps < task.horizon and not terminal[x]:
             u = choose(x)
             following = successor[x][u]
             target = cost[x][u]

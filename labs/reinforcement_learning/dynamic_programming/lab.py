@@ -9,43 +9,47 @@ import numpy as np
 
 from labs.lab import Action, Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
-from labs.plots import Curves, HeatMap, Line, Note, Readout, TimeSeries, Trace
-from labs.reinforcement_learning.dynamic_programming.params import NAMES, DynamicProgrammingParams
-from labs.reinforcement_learning.dynamic_programming.picture import (
-    Picture,
-    board,
-    draw_grid,
-    draw_pendulum,
+from labs.reinforcement_learning.dynamic_programming.follower import (
+    PERIOD,
+    Follower,
+    apply_push,
+    carry_over,
+    follow_policy,
+    start_follower,
 )
-from labs.reinforcement_learning.dynamic_programming.problems import (
-    HORIZON,
-    Walk,
-    afresh,
-    begin,
-    carried,
-    finite_horizon,
-    fits,
-    nudged,
-    problem,
-    state_of,
-    tick,
+from labs.reinforcement_learning.dynamic_programming.params import DynamicProgrammingParams
+from labs.reinforcement_learning.dynamic_programming.plots import (
+    PLOTS,
+    POINTS,
+    horizon_curves,
+    table_maps,
+    table_sizes,
 )
 from labs.reinforcement_learning.dynamic_programming.side_by_side import (
-    METHODS,
-    Rules,
-    Standing,
-    account,
-    curves,
+    ITERATION_METHODS,
+    RANDOM,
+    Iterates,
+    IterationSettings,
+    convergence_curves,
+    iteration_report,
     passes,
     progress,
+    unpack_policy,
 )
-from labs.scene import Scene, cell_at
-from labs.tasks.grid_world.map import MAPS, GridWorld
+from labs.reinforcement_learning.dynamic_programming.tasks import (
+    TabularTask,
+    cold_start,
+    finite_horizon,
+    tabular_task,
+    warm_start,
+)
+from labs.scene import Scene
+from labs.tasks.grid_world.map import MAPS, GridWorld, grid_world
+from labs.tasks.grid_world.params import edit_map
+from labs.tasks.grid_world.picture import draw_board, draw_walkers, draw_way
+from labs.tasks.grid_world.walk import GridWalk, nominal_path
+from labs.tasks.pendulum_table.picture import draw_table
 from labs.tasks.pendulum_table.table import table_size
-
-JOINTS = np.arange(1.0, 8.0)
-POINTS, PIXELS = 250, 51
-"""Of a curve and along one side of a heat map, at most."""
 
 
 @dataclass(kw_only=True)
@@ -54,20 +58,18 @@ class DynamicProgrammingState(State):
 
     seed: int
     """Of all that is drawn."""
-    problem: str
-    """What `standing` is about, ..."""
-    rules: Rules
+    task: str
+    """The key of what `iterates` are about, ..."""
+    settings: IterationSettings
     spread: float
-    """... and how it came about."""
-    standing: Standing
-    walk: Walk
+    """... and how they came about."""
+    iterates: Iterates
+    follower: Follower
 
-
-def _traces(x: str, y: str) -> tuple[Trace, ...]:
-    return tuple(
-        Trace(f"{x}_{m}", f"{y}_{m}", name, series=i + 1)
-        for i, (m, name) in enumerate(METHODS.items())
-    )
+    @property
+    def tabular_task(self) -> TabularTask:
+        """What `iterates` are about."""
+        return tabular_task(self.task)
 
 
 class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState]):
@@ -80,78 +82,8 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         "pendulum that swings up by a lookup table."
     )
     Params = DynamicProgrammingParams
-    period = 0.01
-    plots = (
-        Curves(
-            "Distance to the limit, sweep by sweep",
-            "sweeps k",
-            "max norm",
-            *_traces("sweep", "error"),
-            Trace("sweep_value", "bound", "γᵏ |V₀ − V*|", "dash"),
-            log_y=True,
-        ),
-        Curves(
-            "Distance to the limit by backups",
-            "backups",
-            "max norm",
-            *_traces("backups", "error"),
-            log_x=True,
-            log_y=True,
-        ),
-        Note("What each took", "account"),
-        Curves(
-            "Cost-to-go of the start by the time to go",
-            "steps to go N - i",
-            "V of the start",
-            Trace("stages", "stage_values", "finite horizon", "marked", 1),
-            Trace("ends", "stationary", "infinite horizon", "dash"),
-            Trace("stage", "stage_value", "shown", "points", 2),
-        ),
-        TimeSeries(
-            "Cost of this run",
-            "cost",
-            Line("paid", r"\text{paid}"),
-            Line("promised", r"\text{paid} + \gamma^k V(x_k)", "limit"),
-        ),
-        TimeSeries("Pendulum from upright", "rad", Line("angle", r"q - q^*")),
-        TimeSeries("Torque of the pendulum", "N·m", Line("torque", r"u")),
-        HeatMap(
-            "Cost-to-go",
-            "across",
-            "up",
-            "V",
-            "column; angle from upright [rad]",
-            "row from below; velocity [rad/s]",
-            "V",
-            gaps=True,
-        ),
-        HeatMap(
-            "Policy",
-            "across",
-            "up",
-            "control",
-            "column; angle from upright [rad]",
-            "row from below; velocity [rad/s]",
-            "control, from 0; torque [N·m]",
-            gaps=True,
-        ),
-        Curves(
-            "States of a table by joints",
-            "joints j",
-            "states",
-            Trace("joints", "states", "cᵃ, a = 2j", "marked", 1),
-            Trace("joint", "state", "yours", "points", 2),
-            log_y=True,
-        ),
-        Readout("sweeps", "Sweeps", "", whole=True),
-        Readout("backups", "Backups", "", whole=True),
-        Readout("error", "Distance to the limit", ""),
-        Readout("at_start", "V of the start", ""),
-        Readout("entries", "Entries of this table", "X·U", whole=True),
-        Readout("states", "States of a robot with j joints", ""),
-        Readout("memory", "Memory for its values alone", "GB"),
-        Note("The world", "about"),
-    )
+    period = PERIOD
+    plots = PLOTS
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Four by four": {"map": MAPS["4x4"], "gamma": 1.0, "shown": "evaluation"},
         "Cliff": {"map": MAPS["cliff"], "gamma": 1.0},
@@ -180,11 +112,11 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         seed = int(rng.integers(2**31))
         return DynamicProgrammingState(
             seed=seed,
-            problem=params.key,
-            rules=params.rules,
+            task=params.task,
+            settings=params.settings,
             spread=params.spread,
-            standing=afresh(params.key, seed, params.spread),
-            walk=begin(problem(params.key)),
+            iterates=cold_start(params.task, seed, params.spread),
+            follower=start_follower(tabular_task(params.task)),
         )
 
     def step(
@@ -193,46 +125,44 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         """10 ms of the walker's or the pendulum's life, under the policy shown."""
         if state.trouble:
             return state
-        found, walk = problem(state.problem), state.walk
+        task, follower = state.tabular_task, state.follower
         if "again" in inputs.actions:
-            walk = begin(found, walk.drawn)
+            follower = start_follower(task, follower.draws)
         if "push" in inputs.actions:
-            walk = nudged(found, walk, state.seed)
-        policy: np.ndarray | None = state.standing.policy[params.row]
+            follower = apply_push(task, follower, state.seed)
+        policy: np.ndarray | None = state.iterates.policy[params.row]
         if params.shown == "finite":
-            left = int(params.to_go) - walk.steps
-            _, stages = finite_horizon(state.problem, params.w_f)
+            left = int(params.to_go) - follower.walk.steps
+            _, stages = finite_horizon(state.task, params.w_f)
             policy = stages[left - 1] if left > 0 else None
-        return replace(state, t=state.t + self.period, walk=tick(found, walk, policy, state.seed))
+        follower = follow_policy(task, follower, policy, state.seed)
+        return replace(state, t=state.t + self.period, follower=follower)
 
     def solve(
         self, params: DynamicProgrammingParams, state: DynamicProgrammingState
     ) -> Iterator[Snapshot]:
         """Sweep by sweep: on from where the state is, if it is about this; else from the values
-        it holds, if wanted and they fit; else afresh."""
-        key, rules = params.key, params.rules
-        mdp, limits = problem(key).mdp, problem(key).limits
-        about = {"problem": key, "rules": rules, "spread": params.spread}
+        it holds, if wanted and they fit; else from the initial values."""
+        key, settings, names = params.task, params.settings, list(ITERATION_METHODS)
+        task = tabular_task(key)
+        about = {"task": key, "settings": settings, "spread": params.spread}
         if about == {name: getattr(state, name) for name in about}:
-            at, spent = state.standing, np.array([state.seconds.get(m, 0.0) for m in NAMES])
+            at, spent = state.iterates, np.array([state.seconds.get(m, 0.0) for m in names])
         else:
-            fresh = afresh(key, state.seed, params.spread)
-            warm = params.warm and key != state.problem
-            at = carried(state.standing, state.problem, key, fresh) if warm else fresh
-            spent = np.zeros(len(NAMES))
-        on_the_way = passes(mdp, at, rules, limits) if not at.over else [(at, np.zeros(4))]
-        for i, (now, seconds) in enumerate(on_the_way, 1):
+            at, spent = cold_start(key, state.seed, params.spread), np.zeros(len(names))
+            if params.warm and key != state.task:
+                at = warm_start(state.iterates, state.task, key, at)
+        later = passes(task.mdp, at, settings, task.limits) if not at.over else [(at, np.zeros(4))]
+        for i, (now, seconds) in enumerate(later, 1):
             spent = spent + seconds
-            data = about | {"standing": now, "seconds": dict(zip(NAMES, spent, strict=True))}
-            yield Snapshot(i, data, now.verdict, progress(now, rules.tolerance))
+            data = about | {"iterates": now, "seconds": dict(zip(names, spent, strict=True))}
+            yield Snapshot(i, data, now.stop_reason, progress(now, settings.tolerance))
 
     def accept(
         self, params: DynamicProgrammingParams, state: DynamicProgrammingState, snapshot: Snapshot
     ) -> DynamicProgrammingState:
-        found, walk = problem(snapshot.data["problem"]), state.walk
-        return replace(
-            state, **snapshot.data, walk=walk if fits(found, walk) else begin(found, walk.drawn)
-        )
+        follower = carry_over(tabular_task(snapshot.data["task"]), state.follower)
+        return replace(state, **snapshot.data, follower=follower)
 
     def edit(
         self,
@@ -240,99 +170,77 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         handle: str,
         point: tuple[float, float, float],
     ) -> Mapping[str, Value]:
-        world = GridWorld.parse(params.map, params.kings)
-        cell = cell_at(point, *board(world), *world.shape)
-        if handle != "board" or cell is None:
-            return {}
-        row, column = cell
-        wall = world.rows[row][column] == "#" == params.brush
-        return {"map": world.changed(row, column, "." if wall else params.brush).text}
+        """The map with the cell clicked as the brush says."""
+        return edit_map(grid_world(params.map, params.kings), params.brush, handle, point)
 
     def measure(
         self, params: DynamicProgrammingParams, state: DynamicProgrammingState
     ) -> Measurement:
-        found, walk, at = problem(state.problem), state.walk, state.standing
-        (V, _), mdp, row = _shown(params, state), found.mdp, params.row
+        task, walk, at = state.tabular_task, state.follower.walk, state.iterates
+        shown, _ = _shown(params, state)
+        mdp, row, paid, V = task.mdp, params.row, float(walk.cost[0]), shown
         if params.shown == "finite":
             left = max(int(params.to_go) - walk.steps, 0)
-            V = finite_horizon(state.problem, params.w_f)[0][left]
+            V = finite_horizon(state.task, params.w_f)[0][left]
         states = table_size(int(params.joints), int(params.cuts))
         measured: dict[str, float | np.ndarray] = {
-            "paid": walk.paid,
-            "promised": walk.paid + mdp.gamma**walk.steps * float(V[state_of(found, walk.to)]),
-            "at_start": float(_shown(params, state)[0][found.start]),
+            "paid": paid,
+            "promised": paid + mdp.gamma**walk.steps * float(V[task.state(walk.to[0])]),
+            "at_start": float(shown[task.start]),
             "entries": float(mdp.X * mdp.U),
             "states": float(states),
             "memory": 8e-9 * states,
         }
-        if params.world == "pendulum":
-            turning = walk.steps > 0 and not walk.resting
-            measured["angle"] = float(walk.at[0] % (2 * np.pi) - np.pi)
-            measured["torque"] = float(found.efforts[walk.u]) if turning else 0.0
+        if not isinstance(walk, GridWalk):
+            measured["angle"] = float(walk.at[0, 0] % (2 * np.pi) - np.pi)
+            measured["torque"] = float(walk.torque[0])
         if params.shown != "finite":
             measured |= {"sweeps": float(at.count[row]), "backups": float(at.backups[-1, row])}
-            measured["error"] = float(at.errors[-1, row]) if at.begun[row] else np.nan
+            measured["error"] = float(at.errors[-1, row]) if at.started[row] else np.nan
         return {name: value for name, value in measured.items() if not np.isnan(value)}
 
     def fields(
         self, params: DynamicProgrammingParams, state: DynamicProgrammingState
     ) -> Mapping[str, np.ndarray]:
-        found = problem(state.problem)
-        V, policy = _shown(params, state)
-        stages, _ = finite_horizon(state.problem, params.w_f)
-        best = float(found.limits[3, found.start])
-        controls = np.zeros(found.mdp.X) if policy is None else policy.astype(float)
-        if isinstance(found.place, GridWorld):
-            rows, columns = found.place.shape
-            across, up = np.arange(1.0, columns + 1), np.arange(1.0, rows + 1)
-            values, control = (found.place.on_map(x, np.nan)[::-1] for x in (V, controls))
-        else:
-            every = -(-found.place.q_nodes // PIXELS)
-            across, up = found.place.angles[::every], found.place.velocities[::every]
-            tables = (V, found.efforts[controls.astype(int)])
-            values, control = (x.reshape(found.place.shape)[::every, ::every].T for x in tables)
-        return curves(state.standing, found.mdp.gamma, POINTS) | {
-            "stages": np.arange(HORIZON + 1.0),
-            "stage_values": stages[:, found.start],
-            "ends": np.array([0.0, HORIZON] if np.isfinite(best) else []),
-            "stationary": np.array([best, best] if np.isfinite(best) else []),
-            "stage": np.array([float(int(params.to_go))]),
-            "stage_value": stages[int(params.to_go), found.start : found.start + 1],
-            "across": across,
-            "up": up,
-            "V": values,
-            "control": control,
-            "joints": JOINTS,
-            "states": np.array([float(table_size(int(j), int(params.cuts))) for j in JOINTS]),
-            "joint": np.array([float(int(params.joints))]),
-            "state": np.array([float(table_size(int(params.joints), int(params.cuts)))]),
+        task = state.tabular_task
+        stages, _ = finite_horizon(state.task, params.w_f)
+        return {
+            **convergence_curves(state.iterates, task.mdp.gamma, POINTS),
+            **horizon_curves(task, stages, int(params.to_go)),
+            **table_maps(task, *_shown(params, state)),
+            **table_sizes(int(params.joints), int(params.cuts)),
         }
 
     def notes(
         self, params: DynamicProgrammingParams, state: DynamicProgrammingState
     ) -> Mapping[str, str]:
-        mdp = problem(state.problem).mdp
-        about = mdp.report([problem(state.problem).start])
+        mdp = state.tabular_task.mdp
+        about = mdp.report([state.tabular_task.start])
         if mdp.terminal.any() and not mdp.can_end.all():
             about += f"\nFrom {int((~mdp.can_end).sum())} states no way leads to a goal."
-        return {"account": account(state.standing, state.seconds), "about": about}
+        return {"account": iteration_report(state.iterates, state.seconds), "about": about}
 
     def draw(
         self, scene: Scene, params: DynamicProgrammingParams, state: DynamicProgrammingState
     ) -> None:
-        found = problem(state.problem)
+        task, walk = state.tabular_task, state.follower.walk
         V, policy = _shown(params, state)
         finite = params.shown == "finite"
-        limit = V if finite else found.limits[params.row]
-        top = float(np.abs(limit[np.isfinite(limit)]).max(initial=0.0)) or 1.0
-        picture = Picture(found, V, top, policy)
-        if isinstance(found.place, GridWorld):
-            ways = {"reference": found.solution[1]}
-            if finite:
-                ways["actual"] = finite_horizon(state.problem, params.w_f)[1][: int(params.to_go)]
-            draw_grid(scene, picture, found.place, state.walk, ways)
-        else:
-            draw_pendulum(scene, picture, found.place, state.walk)
+        limit = V if finite else task.limits[params.row]
+        high = float(np.abs(limit[np.isfinite(limit)]).max(initial=0.0)) or 1.0
+        if not isinstance(walk, GridWalk):
+            assert not isinstance(task.place, GridWorld)
+            draw_table(scene, task.place, V, high, policy, walk)
+            return
+        assert isinstance(task.place, GridWorld)
+        if policy is not None and policy[0] == RANDOM:
+            policy = unpack_policy(task.mdp, policy)
+        draw_board(scene, task.place, V, high, policy, relief=True)
+        draw_way(scene, task.place, nominal_path(task.place, task.solution[1]), 1)
+        if finite:
+            _, policies = finite_horizon(state.task, params.w_f)
+            draw_way(scene, task.place, nominal_path(task.place, policies[: int(params.to_go)]), 0)
+        draw_walkers(scene, task.place, walk)
 
 
 def _shown(
@@ -341,8 +249,8 @@ def _shown(
     """The values (X,) and the policy (X,) shown: NaN where the iteration is not begun, None where
     no time is left."""
     if params.shown != "finite":
-        at, row = state.standing, params.row
-        return at.V[row] if at.begun[row] else np.full_like(at.V[row], np.nan), at.policy[row]
-    values, policies = finite_horizon(state.problem, params.w_f)
+        at, row = state.iterates, params.row
+        return at.V[row] if at.started[row] else np.full_like(at.V[row], np.nan), at.policy[row]
+    values, policies = finite_horizon(state.task, params.w_f)
     left = int(params.to_go)
     return values[left], policies[left - 1] if left else None

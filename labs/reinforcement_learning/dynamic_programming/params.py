@@ -1,14 +1,13 @@
 """What the user turns in dynamic programming: the world, the iterations, the horizon."""
 
-from pydantic import field_validator
-
-from labs.errors import LabError
 from labs.params import Group, Params
-from labs.reinforcement_learning.dynamic_programming.problems import HORIZON, grid_key, pendulum_key
-from labs.reinforcement_learning.dynamic_programming.side_by_side import METHODS, Rules
-from labs.tasks.grid_world.map import GridWorld
+from labs.reinforcement_learning.dynamic_programming.side_by_side import (
+    ITERATION_METHODS,
+    IterationSettings,
+)
+from labs.reinforcement_learning.dynamic_programming.tasks import HORIZON, grid_key, pendulum_key
+from labs.tasks.grid_world.params import MapText
 
-NAMES = tuple(METHODS)
 POCKET = """\
 .............
 ...#####.....
@@ -25,7 +24,7 @@ GRID_WORLD = Group("Grid world", effect="solve")
 PENDULUM = Group("Pendulum", effect="solve")
 ITERATIONS = Group("Iterations", effect="solve")
 FINITE_HORIZON = Group("Finite horizon")
-CURSE_OF_DIMENSIONALITY = Group("Curse of dimensionality")
+TABLE_SIZE = Group("Curse of dimensionality")
 
 
 class DynamicProgrammingParams(Params):
@@ -35,7 +34,7 @@ class DynamicProgrammingParams(Params):
     """A map to walk on, or a pendulum whose motor is too weak to lift it at once."""
     gamma: float = WORLD.knob(0.95, 0.0, 1.0, r"\gamma", "", "Discount", step=0.005, effect="solve")
     """Weight of the next step's cost. Every sweep brings the error down by it, at least."""
-    map: str = GRID_WORLD.text(POCKET, "Map", rows=8)
+    map: MapText = GRID_WORLD.text(POCKET, "Map", rows=8)
     """# wall, . free, S start, G goal, C cliff; a last row of digits is the wind upwards. Or click
     on the cells."""
     brush: str = GRID_WORLD.choice("#", BRUSHES, "A click makes", effect="live")
@@ -55,7 +54,10 @@ class DynamicProgrammingParams(Params):
     w_u: float = PENDULUM.knob(0.05, 0.0, 1.0, "w_u", "1/(N·m)²", "Cost of torque", scale="log")
     """Beside 1 for the square of the angle from upright [rad]."""
     shown: str = ITERATIONS.choice(
-        "value", METHODS | {"finite": "Finite horizon"}, "Shown and followed", effect="live"
+        "value",
+        ITERATION_METHODS | {"finite": "Finite horizon"},
+        "Shown and followed",
+        effect="live",
     )
     """Whose values and policy the scene shows, and who drives the walker or the pendulum."""
     m: float = ITERATIONS.knob(5, 1, 50, "m_k", "", "Evaluations", step=1)
@@ -72,33 +74,26 @@ class DynamicProgrammingParams(Params):
     """How many steps are left."""
     w_f: float = FINITE_HORIZON.knob(3.0, 0.0, 10.0, "w_f", "", "Final cost", step=0.1)
     """Of each cell (each radian) left to the goal in a straight line."""
-    joints: float = CURSE_OF_DIMENSIONALITY.knob(6, 1, 7, "j", "", "Joints", step=1)
+    joints: float = TABLE_SIZE.knob(6, 1, 7, "j", "", "Joints", step=1)
     """Of a robot whose table one would like to have."""
-    cuts: float = CURSE_OF_DIMENSIONALITY.knob(10, 2, 100, "c", "", "Values of each", step=1)
+    cuts: float = TABLE_SIZE.knob(10, 2, 100, "c", "", "Values of each", step=1)
     """Into how many values each angle and each velocity is cut."""
 
-    @field_validator("map")
-    @classmethod
-    def _is_a_map(cls, value: str) -> str:
-        try:
-            GridWorld.parse(value)
-        except LabError as error:
-            raise ValueError(str(error)) from None
-        return value
-
     @property
-    def key(self) -> str:
-        """The problem's."""
+    def task(self) -> str:
+        """The key of the task."""
         if self.world == "grid":
             return grid_key(self.map, self.kings, self.slip, self.gamma)
         nodes, levels = (int(n) // 2 * 2 + 1 for n in (self.nodes, self.levels))
         return pendulum_key(nodes, levels, self.torque, self.w_v, self.w_u, self.gamma)
 
     @property
-    def rules(self) -> Rules:
-        return Rules(int(self.m), self.tolerance)
+    def settings(self) -> IterationSettings:
+        """Of the iterations."""
+        return IterationSettings(int(self.m), self.tolerance)
 
     @property
     def row(self) -> int:
         """Of the method shown; of value iteration where the horizon is finite."""
-        return NAMES.index(self.shown) if self.shown in NAMES else 3
+        names = list(ITERATION_METHODS)
+        return names.index(self.shown) if self.shown in names else 3

@@ -22,29 +22,29 @@ from labs.algorithms.bellman import NO_BOUND, Sweep
 from labs.problems.finite_mdp import FiniteMDP, random_policy
 from labs.rounding import rounded_up
 
-METHODS = {
+ITERATION_METHODS = {
     "evaluation": "Policy evaluation",
     "policy": "Policy iteration",
     "modified": "Modified policy iteration",
     "value": "Value iteration",
 }
-SINGLE, SHARE, LARGEST = 60, 20, 100
-"""Sweeps made one a pass; after those a pass makes one for each SHARE made so far, at most LARGEST
-and ..."""
+SINGLE_SWEEPS, SHARE, MAX_BATCH = 60, 20, 100
+"""Sweeps made one a pass; after those a pass makes one for each SHARE made so far, at most
+MAX_BATCH and ..."""
 BACKUPS = 500_000
 """... no more than about as many as take so many backups in each method."""
-MOST = 10_000
+MAX_SWEEPS = 10_000
 """Sweeps after which an iteration is given up."""
 FAILED = NOT_BEGUN, GIVEN_UP = "Not begun", "Given up"
 """How the sentence of an iteration begins that has not converged."""
-LEAST = 1e-12
+SMALLEST_SHOWN = 1e-12
 """What a curve shows of an error of 0, on a logarithmic axis."""
 RANDOM = -1
 """In place of controls: all alike."""
 
 
 @dataclass(frozen=True)
-class Rules:
+class IterationSettings:
     """How to iterate."""
 
     m: int
@@ -54,8 +54,8 @@ class Rules:
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
-    """Where the four stand, in the order of METHODS: plain arrays, each sweep's its own."""
+class Iterates:
+    """Where the four stand, in the order of ITERATION_METHODS; each sweep has arrays of its own."""
 
     V: np.ndarray
     """(4, X)."""
@@ -79,14 +79,14 @@ class Standing:
         return all(self.done)
 
     @property
-    def verdict(self) -> str:
+    def stop_reason(self) -> str:
         """In a sentence once all are done, else empty: whether all have converged, and how near
         they came to their limits, which are known."""
         if not self.over:
             return ""
         short = [
             f"{name}: {done[0].lower()}{done[1:]}"
-            for name, done in zip(METHODS.values(), self.done, strict=True)
+            for name, done in zip(ITERATION_METHODS.values(), self.done, strict=True)
             if done.startswith(FAILED)
         ]
         if short:
@@ -97,41 +97,43 @@ class Standing:
         return f"All four iterations have converged: {left}"
 
     @property
-    def begun(self) -> np.ndarray:
+    def started(self) -> np.ndarray:
         """(4,) bool: which of them have values to show for it, before or after the first sweep."""
         return np.array([not done.startswith(NOT_BEGUN) for done in self.done])
 
 
-def start(mdp: FiniteMDP, V: np.ndarray, policy: np.ndarray, limits: np.ndarray) -> Standing:
+def initial_iterates(
+    mdp: FiniteMDP, V: np.ndarray, policy: np.ndarray, limits: np.ndarray
+) -> Iterates:
     """Before the first sweep. V (4, X); policy (4, X), of which the first two are followed to
     begin with; limits (4, X), infinite where there is none: such an iteration does not begin."""
-    done = tuple(_endless(mdp, limit) for limit in limits)
+    done = tuple(_without_limit(mdp, limit) for limit in limits)
     if not done[1] and mdp.gamma == 1.0:
-        first = policy_evaluation.exact(mdp, _unpacked(mdp, policy[1]))
-        done = (done[0], _endless(mdp, first, "under the policy it starts from"), *done[2:])
+        first = policy_evaluation.exact(mdp, unpack_policy(mdp, policy[1]))
+        done = (done[0], _without_limit(mdp, first, "under the policy it starts from"), *done[2:])
     fresh = np.zeros((1, 4), np.int64)
     errors = _distances(V, limits)[None]
-    return Standing(V, policy, fresh[0], np.array([0, 1, 0, 0]), errors, fresh, done)
+    return Iterates(V, policy, fresh[0], np.array([0, 1, 0, 0]), errors, fresh, done)
 
 
 def passes(
-    mdp: FiniteMDP, at: Standing, rules: Rules, limits: np.ndarray
-) -> Iterator[tuple[Standing, np.ndarray]]:
+    mdp: FiniteMDP, at: Iterates, settings: IterationSettings, limits: np.ndarray
+) -> Iterator[tuple[Iterates, np.ndarray]]:
     """The passes after `at` until all are done, none if they are; with the wall-clock time (4,)
     [s] each pass took."""
     while not at.over:
-        at, seconds = _pass(mdp, at, rules, limits)
+        at, seconds = _pass(mdp, at, settings, limits)
         yield at, seconds
 
 
-def progress(at: Standing, tolerance: float) -> float | None:
+def progress(at: Iterates, tolerance: float) -> float | None:
     """The part done in [0, 1] of the one farthest behind, by the decades its error has come down;
     None while only policy iteration is left, of which nobody knows how many policies it will
     look at."""
     if at.over:
         return 1.0
     parts = []
-    for i, method in enumerate(METHODS):
+    for i, method in enumerate(ITERATION_METHODS):
         first, now = at.errors[0, i], at.errors[-1, i]
         if method != "policy" and not at.done[i] and first > tolerance:
             part = math.log(first / max(now, tolerance)) / math.log(first / tolerance)
@@ -140,56 +142,57 @@ def progress(at: Standing, tolerance: float) -> float | None:
 
 
 def _pass(
-    mdp: FiniteMDP, at: Standing, rules: Rules, limits: np.ndarray
-) -> tuple[Standing, np.ndarray]:
+    mdp: FiniteMDP, at: Iterates, settings: IterationSettings, limits: np.ndarray
+) -> tuple[Iterates, np.ndarray]:
     made = len(at.errors) - 1
-    sweeps = 1 if made < SINGLE else min(made // SHARE, LARGEST, max(1, BACKUPS // (mdp.X * mdp.U)))
-    sweeps = min(sweeps, MOST - made)
+    affordable = max(1, BACKUPS // (mdp.X * mdp.U))
+    sweeps = 1 if made < SINGLE_SWEEPS else min(made // SHARE, MAX_BATCH, affordable)
+    sweeps = min(sweeps, MAX_SWEEPS - made)
     errors = np.vstack([at.errors, np.tile(at.errors[-1], (sweeps, 1))])
     backups = np.vstack([at.backups, np.tile(at.backups[-1], (sweeps, 1))])
     ends, done, seconds = [], list(at.done), np.zeros(4)
-    for i, method in enumerate(METHODS):
-        sweep = _sweep_of(mdp, at, i)
+    for i, method in enumerate(ITERATION_METHODS):
+        sweep = _sweep(mdp, at, i)
         for k in range(made + 1, made + 1 + sweeps):
             if sweep.done:
                 break
             begin = time.perf_counter()
-            sweep = _step(method, mdp, sweep, rules)
+            sweep = _step(method, mdp, sweep, settings)
             seconds[i] += time.perf_counter() - begin
             errors[k:, i] = np.abs(sweep.V - limits[i]).max()
             backups[k:, i] = sweep.backups
         done[i] = sweep.done
-        if made + sweeps >= MOST and not sweep.done:
-            done[i] = f"{GIVEN_UP} after {MOST} sweeps."
+        if made + sweeps >= MAX_SWEEPS and not sweep.done:
+            done[i] = f"{GIVEN_UP} after {MAX_SWEEPS} sweeps."
         ends.append(sweep)
-    standing = Standing(
+    iterates = Iterates(
         V=np.stack([sweep.V for sweep in ends]),
-        policy=np.stack([_packed(sweep.policy) for sweep in ends]),
+        policy=np.stack([_pack_policy(sweep.policy) for sweep in ends]),
         count=np.array([sweep.count for sweep in ends]),
         held=np.array([sweep.held for sweep in ends]),
         errors=errors,
         backups=backups,
         done=tuple(done),
     )
-    return standing, seconds
+    return iterates, seconds
 
 
-def _step(method: str, mdp: FiniteMDP, at: Sweep, rules: Rules) -> Sweep:
+def _step(method: str, mdp: FiniteMDP, at: Sweep, settings: IterationSettings) -> Sweep:
     match method:
         case "evaluation":
-            return policy_evaluation.step(mdp, at, rules.tolerance)
+            return policy_evaluation.step(mdp, at, settings.tolerance)
         case "policy":
-            return policy_iteration.step(mdp, at, math.inf, rules.tolerance)
+            return policy_iteration.step(mdp, at, math.inf, settings.tolerance)
         case "modified":
-            return policy_iteration.step(mdp, at, rules.m, rules.tolerance)
+            return policy_iteration.step(mdp, at, settings.m, settings.tolerance)
         case _:
-            return value_iteration.step(mdp, at, rules.tolerance)
+            return value_iteration.step(mdp, at, settings.tolerance)
 
 
-def _sweep_of(mdp: FiniteMDP, at: Standing, i: int) -> Sweep:
+def _sweep(mdp: FiniteMDP, at: Iterates, i: int) -> Sweep:
     return Sweep(
         V=at.V[i],
-        policy=_unpacked(mdp, at.policy[i]),
+        policy=unpack_policy(mdp, at.policy[i]),
         count=int(at.count[i]),
         backups=int(at.backups[-1, i]),
         held=int(at.held[i]),
@@ -197,13 +200,13 @@ def _sweep_of(mdp: FiniteMDP, at: Standing, i: int) -> Sweep:
     )
 
 
-def _packed(policy: np.ndarray) -> np.ndarray:
+def _pack_policy(policy: np.ndarray) -> np.ndarray:
     if policy.ndim == 2:
         return np.full(len(policy), RANDOM, np.int16)
     return policy.astype(np.int16)
 
 
-def _unpacked(mdp: FiniteMDP, policy: np.ndarray) -> np.ndarray:
+def unpack_policy(mdp: FiniteMDP, policy: np.ndarray) -> np.ndarray:
     return random_policy(mdp) if policy[0] == RANDOM else policy.astype(np.int64)
 
 
@@ -214,7 +217,7 @@ def _distances(V: np.ndarray, limits: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(found), found, 0.0)
 
 
-def _endless(mdp: FiniteMDP, limit: np.ndarray, why: str = "") -> str:
+def _without_limit(mdp: FiniteMDP, limit: np.ndarray, why: str = "") -> str:
     many = int((~np.isfinite(limit)).sum())
     if not many:
         return ""
@@ -225,26 +228,26 @@ def _endless(mdp: FiniteMDP, limit: np.ndarray, why: str = "") -> str:
     )
 
 
-def curves(at: Standing, gamma: float, most: int) -> dict[str, np.ndarray]:
+def convergence_curves(at: Iterates, gamma: float, most: int) -> dict[str, np.ndarray]:
     """For each method its distance to the limit ("error_...") over sweeps ("sweep_...") and over
-    backups ("backups_..."), at `most` places at most and none where it is not begun; and the bound
+    backups ("backups_..."), at `most` places and none where it is not started; and the bound
     gamma^k |V_0 - V*|."""
     found = {}
-    for i, method in enumerate(METHODS):
+    for i, method in enumerate(ITERATION_METHODS):
         last = int(at.count[i])
         places = np.unique(np.rint(np.linspace(0, last, min(last + 1, most))).astype(int))
-        places = places[: len(places) * at.begun[i]]
+        places = places[: len(places) * at.started[i]]
         found[f"sweep_{method}"] = places.astype(float)
-        found[f"error_{method}"] = np.maximum(at.errors[places, i], LEAST)
+        found[f"error_{method}"] = np.maximum(at.errors[places, i], SMALLEST_SHOWN)
         found[f"backups_{method}"] = at.backups[places, i].astype(float)
     found["bound"] = gamma ** found["sweep_value"] * at.errors[0, -1]
     return found
 
 
-def account(at: Standing, seconds: Mapping[str, object]) -> str:
+def iteration_report(at: Iterates, seconds: Mapping[str, object]) -> str:
     """What each took, a line a method. `seconds` by method, as far as they are known."""
     lines = []
-    for i, (method, name) in enumerate(METHODS.items()):
+    for i, (method, name) in enumerate(ITERATION_METHODS.items()):
         spent = seconds.get(method)
         took = f", {1e3 * spent:.3g} ms" if isinstance(spent, float) and spent else ""
         lines.append(

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from labs.errors import LabError
-from labs.reinforcement_learning.markov.tables import Table, parse
+from labs.reinforcement_learning.markov.tables import Table, parse_table
 
 STUDENT = """state,    cost, Lecture, Exercise, Code, Café, Phone, Sleep
 Lecture,  -1,   0,       0.6,      0,    0.1,  0.3,   0
@@ -57,19 +57,19 @@ TITLES: Mapping[str, str] = {
     "random": "A random chain",
     "table": "Your table",
 }
-RANDOM = 6
+RANDOM_STATES = 6
 """States of a random chain."""
-HEAVIEST = 1e6
+MAX_WEIGHT = 1e6
 """Weight in an edited row."""
-ROW_GRAIN = 4
+ROW_DECIMALS = 4
 """Decimals of an edited row."""
 
 
-def table_of(name: str, number: int, own: str) -> Table:
+def chain_table(name: str, number: int, own: str) -> Table:
     """The chain of a name in TITLES: the random one of this number, or the text `own`."""
     if name == "random":
-        return random_chain(RANDOM, number)
-    return parse(own if name == "table" else CHAINS[name])
+        return random_chain(RANDOM_STATES, number)
+    return parse_table(own if name == "table" else CHAINS[name])
 
 
 @cache
@@ -96,7 +96,7 @@ def parse_rows(text: str) -> dict[int, np.ndarray]:
             x, weights = int(number) - 1, np.array([float(entry) for entry in entries.split()])
         except ValueError:
             x, weights = -1, np.zeros(0)
-        sound = weights.any() and ((weights >= 0.0) & (weights <= HEAVIEST)).all()
+        sound = weights.any() and ((weights >= 0.0) & (weights <= MAX_WEIGHT)).all()
         if not (colon and x >= 0 and sound):
             raise LabError(
                 f"{line.strip()!r}: a changed row is the number of a state, a colon and a weight "
@@ -111,7 +111,7 @@ def parse_rows(text: str) -> dict[int, np.ndarray]:
 def write_rows(rows: Mapping[int, np.ndarray]) -> str:
     """The text that says them."""
     lines = (
-        f"{x + 1}: " + " ".join(f"{round(float(p), ROW_GRAIN):g}" for p in rows[x])
+        f"{x + 1}: " + " ".join(f"{round(float(p), ROW_DECIMALS):g}" for p in rows[x])
         for x in sorted(rows)
     )
     return "\n".join(lines)
@@ -136,6 +136,6 @@ def with_probability(row: np.ndarray, y: int, p: float, own: np.ndarray) -> np.n
     return np.insert(rest * ((1.0 - p) / rest.sum()), y, p)
 
 
-def shifted(p: float, shift: float) -> float:
+def shift_probability(p: float, shift: float) -> float:
     """A probability moved towards 0 (shift down to -1: never) or 1 (up to 1: always)."""
     return p + shift * (1.0 - p) if shift > 0.0 else p * (1.0 + shift)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labs.algorithms.markov_chain import Class, is_irreducible, leads_to
+from labs.algorithms.markov_chain import CommunicatingClass, is_irreducible, leads_to
 from labs.reinforcement_learning.markov.reward_process import RewardProcess
 from labs.rounding import rounded_up
 
@@ -71,7 +71,10 @@ def _unending(process: RewardProcess, finite: np.ndarray) -> str:
     names, P = process.table.states, process.P
     free = leads_to(P, finite)
     never, may, sure = np.flatnonzero(~free), np.flatnonzero(free & ~finite), np.flatnonzero(finite)
-    mean, size = process.far @ process.C, process.far @ np.abs(process.C)  # of a step, long run
+    mean, size = (
+        process.long_run @ process.C,
+        process.long_run @ np.abs(process.C),
+    )  # of a step, long run
     mean[np.abs(mean) <= CANCELLED * size] = 0.0
     which = "every state" if len(never) == len(names) else _names(names, never)
     stays = np.concatenate([c.states for c in process.classes if c.closed])
@@ -109,8 +112,7 @@ def controls(process: RewardProcess, gamma: float) -> str:
     if not len(wins):
         return "No control is better than this policy: V = min Q in every state."
     told = [
-        f"{table.controls[best[x]]} in {table.states[x]} "
-        f"({_number(Q[x, best[x]])} < {_number(found.V[x])})"
+        f"{table.controls[best[x]]} in {table.states[x]} ({_less(Q[x, best[x]], found.V[x])})"
         for x in wins
     ]
     return f"Once, and then the policy, is cheaper (Q < V): {', '.join(told)}."
@@ -120,13 +122,13 @@ def edits(process: RewardProcess, source: int, target: int) -> str:
     """Why the chosen transition cannot be edited; empty where it can."""
     if len(process.table.controls) > 1:
         return "These probabilities follow from the policy: they are changed in the table only."
-    if process.has(source, target):
+    if process.can_edit(source, target):
         return ""
     missing = max(source, target) + 1
     return f"There is no state {missing} in this chain: choose a transition between its states."
 
 
-def _parts(names: tuple[str, ...], classes: list[Class]) -> str:
+def _parts(names: tuple[str, ...], classes: list[CommunicatingClass]) -> str:
     closed = [_names(names, c.states) for c in classes if c.closed]
     passed = np.concatenate([c.states for c in classes if not c.closed] or [np.zeros(0, int)])
     said = f"Nothing leads out of {' or out of '.join(closed)}."
@@ -136,7 +138,7 @@ def _parts(names: tuple[str, ...], classes: list[Class]) -> str:
     return said
 
 
-def _one_end(names: tuple[str, ...], modes: np.ndarray, end: Class) -> str:
+def _one_end(names: tuple[str, ...], modes: np.ndarray, end: CommunicatingClass) -> str:
     if end.period > 1:
         return _round_trip(names, end)
     magnitudes = np.abs(modes)
@@ -159,7 +161,7 @@ def _one_end(names: tuple[str, ...], modes: np.ndarray, end: Class) -> str:
     )
 
 
-def _round_trip(names: tuple[str, ...], c: Class) -> str:
+def _round_trip(names: tuple[str, ...], c: CommunicatingClass) -> str:
     where = "" if len(c.states) == len(names) else f" within {_names(names, c.states)}"
     return (
         f"Periodic: ways back{where} take multiples of {c.period} steps. {_count(c.period)} "
@@ -173,8 +175,14 @@ def _names(names: tuple[str, ...], states: np.ndarray) -> str:
     return told[0] if len(told) == 1 else f"{', '.join(told[:-1])} and {told[-1]}"
 
 
-def _number(value: float) -> str:
-    return f"{value:.3g}".replace("-", "−")
+def _number(value: float, digits: int = 3) -> str:
+    return f"{value:.{digits}g}".replace("-", "−")
+
+
+def _less(a: float, b: float) -> str:
+    """a < b, in as many digits as it takes to see it."""
+    digits = next((d for d in range(3, 17) if f"{a:.{d}g}" != f"{b:.{d}g}"), 17)
+    return f"{_number(a, digits)} < {_number(b, digits)}"
 
 
 def _times(n: int) -> str:

@@ -24,13 +24,13 @@ REST = np.array([0.0, 0.0, 0.1])
 """From a tile to the token on it."""
 
 
-def places(n: int) -> np.ndarray:
+def state_places(n: int) -> np.ndarray:
     """(n, 3) of the states: clockwise, the first one at the far end."""
     angle = 0.5 * np.pi - 2.0 * np.pi * np.arange(n) / n
     return np.stack([ACROSS * np.cos(angle), ALONG * np.sin(angle), np.full(n, HEIGHT)], axis=1)
 
 
-def way(where: np.ndarray, x: int, y: int, s: np.ndarray) -> np.ndarray:
+def ribbon_points(where: np.ndarray, x: int, y: int, s: np.ndarray) -> np.ndarray:
     """(len(s), 3): the points at s in [0, 1] along the ribbon from state x to state y."""
     if x == y:
         outward = where[x] * (1.0, 1.0, 0.0)
@@ -49,23 +49,23 @@ def way(where: np.ndarray, x: int, y: int, s: np.ndarray) -> np.ndarray:
     return curve
 
 
-def bead(where: np.ndarray, x: int, y: int, p: float) -> np.ndarray:
+def bead_place(where: np.ndarray, x: int, y: int, p: float) -> np.ndarray:
     """(3,): the place on the ribbon from x to y that stands for the probability p."""
-    place: np.ndarray = way(where, x, y, np.array([NEVER + (ALWAYS - NEVER) * p]))[0]
+    place: np.ndarray = ribbon_points(where, x, y, np.array([NEVER + (ALWAYS - NEVER) * p]))[0]
     return place
 
 
-def probability(where: np.ndarray, x: int, y: int, point: np.ndarray) -> float:
+def probability_at(where: np.ndarray, x: int, y: int, point: np.ndarray) -> float:
     """That of the bead's place nearest to a point (3,), seen from above; in hundredths."""
     p = np.linspace(0.0, 1.0, 101)
-    off = way(where, x, y, NEVER + (ALWAYS - NEVER) * p)[:, :2] - point[:2]
+    off = ribbon_points(where, x, y, NEVER + (ALWAYS - NEVER) * p)[:, :2] - point[:2]
     return round(float(p[np.argmin((off**2).sum(axis=1))]), 2)
 
 
-def on_the_way(where: np.ndarray, x: int, y: int, s: float) -> np.ndarray:
+def token_place(where: np.ndarray, x: int, y: int, s: float) -> np.ndarray:
     """(3,): a token that has come the part s of its way from state x to state y: it hops."""
     s = s * s * (3.0 - 2.0 * s)
-    start, place, end = way(where, x, y, np.array([0.0, s, 1.0]))
+    start, place, end = ribbon_points(where, x, y, np.array([0.0, s, 1.0]))
     # A ribbon begins and ends a little off the middles of the tiles.
     place = place + (1.0 - s) ** 4 * (where[x] - start) + s**4 * (where[y] - end)
     hop: np.ndarray = place + REST + [0.0, 0.0, 0.5 * s * (1.0 - s)]
@@ -79,8 +79,8 @@ def ribbon(where: np.ndarray, x: int, y: int, p: float) -> np.ndarray:
     half = np.full(len(s), THIN + WIDE * p)
     half[0] = half[-1] = 0.0
     half[-2] = 2.2 * half[-2] + 0.012
-    line = way(where, x, y, s)
-    ahead = way(where, x, y, s + 1e-4) - way(where, x, y, s - 1e-4)
+    line = ribbon_points(where, x, y, s)
+    ahead = ribbon_points(where, x, y, s + 1e-4) - ribbon_points(where, x, y, s - 1e-4)
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
     left = half[:, None] * np.stack([-ahead[:, 1], ahead[:, 0], np.zeros(len(s))], axis=1)
     return np.stack([line + left, line - left])

@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from labs.reinforcement_learning.markov.graph import PAD, bead, ribbons
+from labs.reinforcement_learning.markov.graph import PAD, bead_place, ribbons
 from labs.reinforcement_learning.markov.reward_process import RewardProcess
 from labs.scene import Color, Scene
 
@@ -22,17 +22,17 @@ def draw_chain(
     the balls of states that are left for good are gray. The ribbons of state `source` are blue,
     with beads on those to the states in `beads`."""
     scene.camera((0.0, -1.1, 1.95), (0.0, -0.1, 0.0))
-    where, P = process.where, process.P
+    where, P = process.places, process.P
     tints = np.clip(EMPTY + np.sqrt(mu)[:, None] * (FULL - EMPTY), 0.0, 1.0)
     for x, (place, name) in enumerate(zip(where, process.table.states, strict=True)):
         corner = place - [PAD / 2, PAD / 2, 0.0]
         scene.cells(f"tile {x + 1}", corner, PAD, tints[x, None, None])
-        color: Color = "muted" if process.passing[x] else "actual"
+        color: Color = "muted" if process.transient[x] else "actual"
         scene.sphere(f"state {x + 1}", place + LOW, 0.045, color)
         scene.label(f"name {x + 1}", f"{x + 1} {name}", place + BELOW)
     scene.surface("transitions", *_strip(process, source, tuple(beads)))
     for y in beads:
-        place = bead(where, source, y, P[source, y])
+        place = bead_place(where, source, y, P[source, y])
         scene.handle(f"bead {y + 1}", place + LOW, 0.05)
         scene.label(f"chance {y + 1}", f"{P[source, y]:.2g}", place + ABOVE)
 
@@ -45,6 +45,6 @@ def _strip(
     shown = process.P > 0.0
     if beads:
         shown[source, beads] = True
-    strip, of = ribbons(process.where, process.P, shown)
+    strip, of = ribbons(process.places, process.P, shown)
     tones = np.where(of[:, None] == source, BLUE, GRAY)
     return strip, np.stack([tones, tones])

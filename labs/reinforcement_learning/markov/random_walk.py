@@ -16,7 +16,7 @@ import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
-class Walk:
+class RandomWalk:
     """Where a walk is, and what it has come to. Its arrays are never written into."""
 
     key: int
@@ -29,7 +29,7 @@ class Walk:
     """Done, k."""
     mu: np.ndarray
     """(X,) distribution after k steps."""
-    ahead: np.ndarray
+    next_mu: np.ndarray
     """(X,) after the step under way."""
     visits: np.ndarray
     """(X,) how often it was where, the start included."""
@@ -37,13 +37,13 @@ class Walk:
     """The part of the step under way that is done, in [0, 1)."""
 
 
-def begin(P: np.ndarray, start: int, key: int) -> Walk:
+def start_random_walk(P: np.ndarray, start: int, key: int) -> RandomWalk:
     """A walk that has not done a step."""
     there = np.eye(len(P))[start]
-    return Walk(key, start, start, _drawn(key, 0, P[start]), 0, there, there @ P, there)
+    return RandomWalk(key, start, start, _drawn(key, 0, P[start]), 0, there, there @ P, there)
 
 
-def advance(P: np.ndarray, walk: Walk, part: float) -> Walk:
+def advance_random_walk(P: np.ndarray, walk: RandomWalk, part: float) -> RandomWalk:
     """The walk when another `part` >= 0 of a step is done, which may be several steps."""
     at, to, k, mu = walk.at, walk.to, walk.steps, walk.mu
     visits, phase = walk.visits.copy(), walk.phase + part
@@ -51,7 +51,7 @@ def advance(P: np.ndarray, walk: Walk, part: float) -> Walk:
         at, mu, k, phase = to, mu @ P, k + 1, phase - 1.0
         visits[at] += 1.0
         to = _drawn(walk.key, k, P[at])
-    return replace(walk, at=at, to=to, steps=k, mu=mu, ahead=mu @ P, visits=visits, phase=phase)
+    return replace(walk, at=at, to=to, steps=k, mu=mu, next_mu=mu @ P, visits=visits, phase=phase)
 
 
 def _drawn(key: int, k: int, row: np.ndarray) -> int:

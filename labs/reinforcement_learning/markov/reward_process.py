@@ -7,15 +7,15 @@ from functools import cached_property
 import numpy as np
 
 from labs.algorithms.markov_chain import (
-    Class,
+    CommunicatingClass,
     CostToGo,
     communicating_classes,
     cost_to_go,
     eigenvalues,
     long_run,
 )
-from labs.reinforcement_learning.markov.chains import shifted, with_probability, with_rows
-from labs.reinforcement_learning.markov.graph import places, probability
+from labs.reinforcement_learning.markov.chains import shift_probability, with_probability, with_rows
+from labs.reinforcement_learning.markov.graph import probability_at, state_places
 from labs.reinforcement_learning.markov.tables import Table
 
 
@@ -37,23 +37,23 @@ class RewardProcess:
     table: Table
     policy: np.ndarray
     """(X, U) pi(u | x)."""
-    own: np.ndarray
+    unedited: np.ndarray
     """(X, X) P before any edit."""
     P: np.ndarray
     C: np.ndarray
     """(X,)."""
-    classes: list[Class]
-    far: np.ndarray
+    classes: list[CommunicatingClass]
+    long_run: np.ndarray
     """(X, X): shares of time in the long run, by the state of the start."""
-    where: np.ndarray
+    places: np.ndarray
     """(X, 3) [m] of the states in the scene."""
 
-    def has(self, *states: int) -> bool:
+    def can_edit(self, *states: int) -> bool:
         """Whether these states exist, in a chain without controls: it can be edited there."""
         return len(self.table.controls) == 1 and max(states) < len(self.P)
 
     @cached_property
-    def passing(self) -> np.ndarray:
+    def transient(self) -> np.ndarray:
         """(X,) bool: the states that are left for good sooner or later."""
         stays = np.concatenate([c.states for c in self.classes if c.closed])
         return ~np.isin(np.arange(len(self.P)), stays)
@@ -75,16 +75,16 @@ class RewardProcess:
     def beads(self, x: int, y: int) -> list[int]:
         """The states to which beads lead from x: where it goes, and y; none where x, or any of
         its probabilities, cannot be edited."""
-        if not self.has(x):
+        if not self.can_edit(x):
             return []
-        leads = self.own[x] + self.P[x] > 0.0
+        leads = self.unedited[x] + self.P[x] > 0.0
         leads[y : y + 1] = True
         return [int(z) for z in np.flatnonzero(leads)]
 
-    def dragged(self, x: int, y: int, point: np.ndarray) -> np.ndarray:
+    def row_with_bead_at(self, x: int, y: int, point: np.ndarray) -> np.ndarray:
         """(X,): row x with its probability of y where a bead dragged to `point` (3,) [m] says."""
-        p = probability(self.where, x, y, point)
-        return with_probability(self.P[x], y, p, self.own[x])
+        p = probability_at(self.places, x, y, point)
+        return with_probability(self.P[x], y, p, self.unedited[x])
 
 
 def reward_process(table: Table, first: float, edit: Edit) -> RewardProcess:
@@ -99,7 +99,7 @@ def reward_process(table: Table, first: float, edit: Edit) -> RewardProcess:
         P = with_rows(own, edit.rows)
         x, y = edit.source, edit.target
         if max(x, y) < X and edit.shift != 0.0:
-            P[x] = with_probability(P[x], y, shifted(P[x, y], edit.shift), own[x])
+            P[x] = with_probability(P[x], y, shift_probability(P[x, y], edit.shift), own[x])
     classes = communicating_classes(P)
     C = mdp.policy_cost(policy)
-    return RewardProcess(table, policy, own, P, C, classes, long_run(P, classes), places(X))
+    return RewardProcess(table, policy, own, P, C, classes, long_run(P, classes), state_places(X))

@@ -30,12 +30,12 @@ import numpy as np
 from labs.errors import LabError
 from labs.problems.finite_mdp import FiniteMDP
 
-SUM = 1e-6
+SUM_TOLERANCE = 1e-6
 """How far a row may be from summing to 1: somebody wrote 0.333333."""
-LARGEST = 1e6
+MAX_COST = 1e6
 """Of a cost, either sign."""
 
-MOST = 1000
+MAX_STATES = 1000
 """States of a table."""
 
 
@@ -76,7 +76,7 @@ class _Row:
         return _name(self.number, self.state, self.control)
 
 
-def parse(text: str, most: int = MOST) -> Table:
+def parse_table(text: str, most: int = MAX_STATES) -> Table:
     """The table of at most `most` states a text holds, CSV or JSON. Raises LabError with the row
     that is wrong, what it says and what is allowed."""
     rows = list(_json_rows(text) if text.lstrip()[:1] in ("[", "{") else _csv_rows(text))
@@ -116,7 +116,7 @@ def _probabilities(row: _Row, states: tuple[str, ...]) -> np.ndarray:
         if not 0.0 <= value <= 1.0:
             raise LabError(f"{row.name}: {value:g} for {name}: a probability is from 0 to 1")
         p[states.index(name)] = value
-    if abs(p.sum() - 1.0) > SUM:
+    if abs(p.sum() - 1.0) > SUM_TOLERANCE:
         raise LabError(
             f"{row.name}: the probabilities sum to {p.sum():.6g}; they must sum to 1 "
             "(fractions such as 1/3 are fine)"
@@ -183,8 +183,8 @@ def _row(number: int, state: str, control: str, cost: float, to: Mapping[str, An
     name = _name(number, state, control)
     if not state:
         raise LabError(f"row {number}: it does not name its state")
-    if abs(cost) > LARGEST:
-        raise LabError(f"{name}: the cost {cost:g} is beyond {LARGEST:g}")
+    if abs(cost) > MAX_COST:
+        raise LabError(f"{name}: the cost {cost:g} is beyond {MAX_COST:g}")
     return _Row(number, state, control, cost, {y: _number(p, name, y) for y, p in to.items()})
 
 

@@ -6,56 +6,32 @@ from typing import ClassVar
 
 import numpy as np
 
-from labs.errors import LabError, ParameterError
 from labs.lab import Inputs, Lab, Measurement, Snapshot, State
-from labs.params import Group, Value
-from labs.plots import Curves, HeatMap, Line, Readout, TimeSeries, Trace
+from labs.params import Value
 from labs.random_numbers import seeded
-from labs.reinforcement_learning.td_control.params import BATCHES, METHODS, LearningParams
-from labs.reinforcement_learning.td_control.picture import CELL, board, draw_grid, draw_pendulum
-from labs.reinforcement_learning.td_control.tasks import PENDULUM, Task
+from labs.reinforcement_learning.td_control import greedy
+from labs.reinforcement_learning.td_control.params import BATCHES, LEARNING_METHODS, TdParams
+from labs.reinforcement_learning.td_control.plots import ORDER, PLOTS, learner_maps, learning_curves
+from labs.reinforcement_learning.td_control.tasks import LearningTask
 from labs.reinforcement_learning.td_control.training import (
-    CURVES,
     Training,
-    batch,
-    begin,
-    fits,
-    further,
-    moved,
-    trained,
+    batch_size,
+    episodes_done,
+    fits_task,
+    initial_training,
+    train,
+    transfer,
 )
-from labs.reinforcement_learning.td_control.walks import PERIOD, Walk, set_out, walked
-from labs.scene import Scene, cell_at
-from labs.tasks.grid_world.map import MAPS
+from labs.scene import Scene
+from labs.tasks.grid_world.map import MAPS, GridWorld, grid_world
+from labs.tasks.grid_world.params import edit_map
+from labs.tasks.grid_world.picture import draw_board, draw_walkers, draw_way
+from labs.tasks.grid_world.walk import GridWalk, nominal_path
+from labs.tasks.pendulum_table.picture import draw_table
+from labs.tasks.pendulum_table.swing import Swing
 
-SEEDS = {"grid": 10, "pendulum": 5}
-"""Learners of each method."""
-ORDER = ("first", "second")
-AXES = ("column, or angle from upright [rad]", "row from below, or velocity [rad/s]")
-WINDOW = 10
-"""Batches over which the cost of learning is averaged."""
 OPTIMAL = 1e-9
 """A greedy walk that costs this much more than the best at most is one of the best."""
-
-
-VIEW = Group("View")
-
-
-class TdParams(LearningParams):
-    """What the user can turn."""
-
-    shown: str = VIEW.choice("first", {"first": "First", "second": "Second"}, "Values of method")
-    """Whose estimates colour the scene and the maps."""
-    learner: float = VIEW.knob(1, 1, 10, "s", "", "Learner", step=1)
-    """Which of those who learn side by side is shown."""
-    control: float = VIEW.knob(0, 0, 8, r"u_{map}", "", "Control of the map", step=1)
-    """The map of Q shows this control; 0: the best in each state."""
-
-    @property
-    def view(self) -> tuple[int, int]:
-        """Which method's learner is shown, and which of its learners."""
-        second = self.shown == "second" and self.second != "none"
-        return int(second), min(round(self.learner), SEEDS[self.system]) - 1
 
 
 @dataclass(kw_only=True)
@@ -63,18 +39,10 @@ class TdState(State):
     """What was learned, and a walk that shows it."""
 
     training: Training
-    walk: Walk
-
-
-def _curves(title: str, y_label: str, mean: str, *edges: str) -> Curves:
-    """Over episodes, for both methods: a line, dashed ones, and what dynamic programming says."""
-    traces = []
-    for i, name in enumerate(ORDER):
-        traces.append(Trace(f"episodes_{name}", f"{mean}_{name}", name, series=1 + i))
-        traces += [Trace(f"episodes_{name}", f"{edge}_{name}", "", "dash", 1 + i) for edge in edges]
-    if mean in ("online", "offline"):
-        traces.append(Trace("best_x", "best_y", "optimal", "dash"))
-    return Curves(title, "episodes", y_label, *tuple(traces), log_y=True)
+    walk: GridWalk | Swing
+    """One of each method."""
+    random: np.ndarray
+    """(4,) uint64: of what the walk meets."""
 
 
 class TdControl(Lab[TdParams, TdState]):
@@ -87,23 +55,8 @@ class TdControl(Lab[TdParams, TdState]):
         "their values, policies and mistakes, episode by episode."
     )
     Params = TdParams
-    period = PERIOD
-    plots = (
-        _curves("Cost of an episode while learning", "J", "online", "online_low", "online_high"),
-        _curves("Cost of the greedy policy, median", "J", "offline"),
-        _curves("Distance to Q*", "mean (root of squares); dashed: largest", "off", "most"),
-        HeatMap("Q of the learner shown", "x", "y", "q", *AXES, "Q"),
-        HeatMap("Greedy policy", "x", "y", "policy", *AXES, "u"),
-        HeatMap("Visits", "x", "y", "visits", *AXES, "log₁₀(1 + n)"),
-        HeatMap("Error of min Q", "x", "y", "error", *AXES, "|V − V*|"),
-        TimeSeries("Cost of the walk in the scene", "", Line("paid", "J"), select="method"),
-        Readout("trained", "Episodes of each learner", "", whole=True),
-        Readout("optimum", "Optimal cost", ""),
-        Readout("greedy_first", "Greedy, median, first", ""),
-        Readout("greedy_second", "Greedy, median, second", ""),
-        Readout("best_first", "Optimal learners, first", "", whole=True),
-        Readout("best_second", "Optimal learners, second", "", whole=True),
-    )
+    period = greedy.PERIOD
+    plots = PLOTS
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Cliff": {},
         "Windy grid": {"map": MAPS["windy"], "episodes": 1000},
@@ -128,68 +81,59 @@ class TdControl(Lab[TdParams, TdState]):
 
     def init(self, params: TdParams, rng: np.random.Generator) -> TdState:
         task, many = params.task, len(params.methods)
-        training = begin(task, many, SEEDS[params.system], rng, params.q0)
-        walk = set_out(params.system, task, many, seeded(rng, 1)[0])
-        return TdState(training=training, walk=walk)
+        training = initial_training(task, many, params.learners, rng, params.q0)
+        return TdState(
+            training=training, walk=greedy.start_greedy_walk(task, many), random=seeded(rng, 1)[0]
+        )
 
     def step(self, params: TdParams, inputs: Inputs, state: TdState) -> TdState:
         """10 ms of the walk under the greedy policies of the moment."""
         if state.trouble:
             return state
-        task = params.task
         _, s = params.view
-        policies = _present(params, state)["q"][:, s].argmin(axis=2)
-        walk = walked(params.system, task, policies, state.walk)
-        return replace(state, t=state.t + self.period, walk=walk)
+        policies = _current(params, state)["q"][:, s].argmin(axis=2)
+        random = state.random.copy()
+        walk = greedy.follow_greedy_policies(params.task, policies, state.walk, random)
+        return replace(state, t=state.t + self.period, walk=walk, random=random)
 
     def solve(self, params: TdParams, state: TdState) -> Iterator[Snapshot]:
         """A batch of episodes an iteration; goes on from what was learned."""
         task, training = params.task, state.training
-        behavior, rule, kinds = params.behavior(task), params.rule(task), params.kinds
+        behaviour, rule, kinds = params.behaviour, params.rule, params.kinds
         if not training["sound"]:
             rng = np.random.default_rng(training["random"][0, 0])
-            training = begin(task, len(kinds), SEEDS[params.system], rng, params.q0)
-        elif not fits(training, task):
-            training = moved(training, task, params.q0)
-        begun, wanted, i = trained(training), round(params.episodes), 0
+            training = initial_training(task, len(kinds), params.learners, rng, params.q0)
+        elif not fits_task(training, task):
+            training = transfer(training, task, params.q0)
+        begun, wanted, i = episodes_done(training), round(params.episodes), 0
         most = -(-wanted // BATCHES)
         done = ""
         while not done:
-            left = wanted - (trained(training) - begun)
-            episodes = min(left, batch(task, rule, kinds, training, most))
-            training, i = further(task, behavior, rule, kinds, training, episodes), i + 1
+            left = wanted - (episodes_done(training) - begun)
+            episodes = min(left, batch_size(task, rule, kinds, training, most))
+            training, i = train(task, behaviour, rule, kinds, training, episodes), i + 1
             if not training["sound"]:
                 done = "The estimates diverged."
             elif left == episodes:
-                done = f"{trained(training)} episodes learned."
+                done = f"{episodes_done(training)} episodes learned."
             yield Snapshot(i, training, done, 1.0 - (left - episodes) / wanted)
 
     def accept(self, params: TdParams, state: TdState, snapshot: Snapshot) -> TdState:
         training = snapshot.data
-        trouble = "" if training["sound"] else _diverged(training)
+        trouble = "" if training["sound"] else _divergence_message(training)
         return replace(state, training=training, trouble=trouble)
 
     def edit(
         self, params: TdParams, handle: str, point: tuple[float, float, float]
     ) -> Mapping[str, Value]:
         """The map with the cell clicked as the brush says."""
-        world = params.world
-        rows, columns = world.shape
-        cell = cell_at(point, board(world.shape), CELL, rows, columns)
-        if handle != "board" or cell is None:
-            return {}
-        row, column = cell
-        again = params.brush in "#C" and world.rows[row][column] == params.brush
-        try:
-            return {"map": world.changed(row, column, "." if again else params.brush).text}
-        except LabError as error:
-            raise ParameterError(str(error)) from None
+        return edit_map(grid_world(params.map, params.kings), params.brush, handle, point)
 
     def measure(self, params: TdParams, state: TdState) -> Measurement:
         task, training = params.task, state.training
         measured: dict[str, float | np.ndarray] = {
-            "paid": state.walk.paid,
-            "trained": float(trained(training)),
+            "paid": state.walk.cost,
+            "trained": float(episodes_done(training)),
         }
         best = float(task.q_star[task.start].min())
         if np.isfinite(best):
@@ -197,92 +141,56 @@ class TdControl(Lab[TdParams, TdState]):
         if training["offline"].shape[-1]:
             for name, costs in zip(ORDER, training["offline"][..., -1], strict=False):
                 measured[f"greedy_{name}"] = float(np.median(costs))
-                if task.mdp.deterministic:
+                if task.mdp.deterministic and np.isfinite(best):
                     measured[f"best_{name}"] = float((costs <= best + OPTIMAL).sum())
         return measured
 
     def fields(self, params: TdParams, state: TdState) -> Mapping[str, np.ndarray]:
-        """Maps are seen from above, row 0 on top."""
-        task, training = params.task, _present(params, state)
-        m, s = params.view
-        q, visits = training["q"][m, s], training["visits"][m, s]
-        value, best = q.min(axis=1), np.where(task.judged, task.q_star.min(axis=1), 0.0)
+        task, training, (m, s) = params.task, _current(params, state), params.view
         control = min(round(params.control), task.mdp.U)
-        meaning = np.arange(1.0, task.mdp.U + 1)
-        x, y = np.arange(task.shape[1]), np.arange(task.shape[0])
-        if params.system == "pendulum":
-            meaning, x, y = PENDULUM.torques[:, 0], PENDULUM.angles, PENDULUM.velocities
-        maps = {
-            "q": q[:, control - 1] if control else value,
-            "policy": meaning[q.argmin(axis=1)],
-            "visits": np.log10(1.0 + visits.sum(axis=1)),
-            "error": np.where(task.judged, np.abs(value - best), 0.0),
-        }
-        upright = -1 if params.system == "grid" else 1
-        laid = {name: task.laid(values)[::upright] for name, values in maps.items()}
-        return {"x": x, "y": y} | laid | _progress(task, training)
+        shown = learner_maps(task, training["q"][m, s], training["visits"][m, s], control)
+        return shown | learning_curves(task, training)
 
     def draw(self, scene: Scene, params: TdParams, state: TdState) -> None:
-        task, training = params.task, _present(params, state)
-        m, s = params.view
-        tables = training["q"][:, s]
-        if params.system == "pendulum":
-            names = [METHODS[name] for name in params.methods]
-            draw_pendulum(scene, task, tables, names, state.walk, m)
-        else:
-            tried = training["visits"][m, s].sum(axis=1)
-            draw_grid(scene, params.world, task, tables, tried, m, state.walk)
+        task, training, (m, s) = params.task, _current(params, state), params.view
+        tables, known = training["q"][:, s], training["visits"][m, s].any(axis=1)
+        V, policy = tables[m].min(axis=1), tables[m].argmin(axis=1)
+        if isinstance(state.walk, Swing):
+            assert not isinstance(task.place, GridWorld)
+            names = [LEARNING_METHODS[name] for name in params.methods]
+            high = float(task.q_star.min(axis=1).max())
+            draw_table(scene, task.place, V, high, policy, state.walk, names, known=known)
+            return
+        assert isinstance(task.place, GridWorld)
+        draw_board(scene, task.place, V, _dearest(task, V), policy, known=known)
+        for i, q in enumerate(tables):
+            draw_way(scene, task.place, nominal_path(task.place, q.argmin(axis=1)), i)
+        draw_walkers(scene, task.place, state.walk)
 
     @classmethod
     def prepare(cls) -> None:
         """Compiles the loops of all methods; the worlds share them."""
         lab = cls()
-        for method in METHODS:
+        for method in LEARNING_METHODS:
             params = TdParams(method=method, second="none")
             state = lab.init(params, np.random.default_rng(0))
             lab.step(params, Inputs(), lab.accept(params, state, next(lab.solve(params, state))))
 
 
-def _present(params: TdParams, state: TdState) -> Training:
+def _current(params: TdParams, state: TdState) -> Training:
     """What was learned, on the map of now."""
     task, training = params.task, state.training
-    return training if fits(training, task) else moved(training, task, params.q0)
+    return training if fits_task(training, task) else transfer(training, task, params.q0)
 
 
-def _progress(task: Task, training: Training) -> dict[str, np.ndarray]:
-    """The curves over episodes: the mean (of greedy costs the median) of all learners, the least
-    and the largest."""
-    episodes, none = training["episodes"], np.zeros(0)
-    best = float(task.q_star[task.start].min())
-    known = np.isfinite(best) and len(episodes)
-    found = {
-        "best_x": episodes[[0, -1]] if known else none,
-        "best_y": np.full(2, best) if known else none,
-    }
-    for m, name in enumerate(ORDER):
-        there = m < len(training["q"])
-        found[f"episodes_{name}"] = episodes if there else none
-        curves = {c: training[c][m] if there else np.zeros((1, 0)) for c in CURVES}
-        curves["online"] = _smooth(curves["online"])
-        for curve, points in curves.items():
-            # One learner who walks in circles hides all others in a mean of greedy costs.
-            middle = np.median if curve == "offline" else np.mean
-            found[f"{curve}_{name}"] = middle(points, axis=0)
-            found[f"{curve}_low_{name}"] = points.min(axis=0)
-            found[f"{curve}_high_{name}"] = points.max(axis=0)
-    return found
+def _dearest(task: LearningTask, V: np.ndarray) -> float:
+    """The top of the scale of colours: the largest estimate, within reason."""
+    best = float(task.q_star[task.compared].min(axis=1).max(initial=1.0))
+    return float(np.clip(V.max(), best, 3.0 * best))
 
 
-def _smooth(curves: np.ndarray) -> np.ndarray:
-    """Each point (..., k) the mean of itself and up to WINDOW - 1 before it."""
-    sums = np.cumsum(curves, axis=-1)
-    late = sums[..., WINDOW:] - sums[..., :-WINDOW]
-    counts = np.minimum(np.arange(curves.shape[-1]) + 1, WINDOW)
-    return np.asarray(np.concatenate([sums[..., :WINDOW], late], axis=-1) / counts)
-
-
-def _diverged(training: Training) -> str:
+def _divergence_message(training: Training) -> str:
     return (
-        f"The estimates diverged by episode {trained(training)}: what a trace adds to an "
+        f"The estimates diverged by episode {episodes_done(training)}: what a trace adds to an "
         "estimate overshoots. Take a smaller step size or trace decay, or replacing traces."
     )

@@ -1,44 +1,78 @@
-"""How the lab of model-free control learns: its tunables, as the algorithms take them."""
+"""What the user turns in model-free control: the task, how it is learned, and what is shown."""
 
 import numpy as np
 
 from labs.algorithms import exploration
-from labs.algorithms.exploration import Behavior
-from labs.params import Group
-from labs.problems.episodes import Rule
-from labs.reinforcement_learning.td_control.tasks import Task, TaskParams
+from labs.algorithms.exploration import BehaviourPolicy
+from labs.params import Group, Params
+from labs.problems.episodes import UpdateRule
+from labs.reinforcement_learning.td_control.tasks import (
+    LARGEST_GAMMA,
+    LearningTask,
+    grid_task,
+    pendulum_task,
+)
+from labs.tasks.grid_world.map import MAPS
+from labs.tasks.grid_world.params import MapText
 
-METHODS = {
+LEARNING_METHODS = {
     "q-learning": "Q-learning",
     "sarsa": "SARSA",
     "sarsa-n": "SARSA(n)",
     "sarsa-lambda": "SARSA(λ)",
 }
 """In the order of the numbers in labs/algorithms/td_control.py."""
-EXPLORERS = {
+EXPLORATIONS = {
     "epsilon-greedy": "ε-greedy",
     "boltzmann": "Boltzmann",
     "confidence": "Lowest confidence bound",
     "follow": "Another controller drives",
 }
 """In the order of the numbers in labs/algorithms/exploration.py."""
+LEARNERS = {"grid": 10, "pendulum": 5}
+"""Of each method."""
 BATCHES = 250
 """Iterations of a training, or more while its episodes are long."""
 DIVERGED = 1e6
 """Times the largest cost: what no estimate reaches that converges."""
 
-
+WORLD = Group("World", effect="solve")
 LEARNING = Group("Learning", effect="solve")
 EXPLORATION = Group("Exploration", effect="solve")
+VIEW = Group("View")
 
 
-class LearningParams(TaskParams):
-    """What fixes a training."""
+class TdParams(Params):
+    """What the user can turn."""
 
-    method: str = LEARNING.choice("q-learning", METHODS, "Method", effect="restart")
+    system: str = WORLD.choice(
+        "grid", {"grid": "Grid world", "pendulum": "Pendulum"}, "World", effect="restart"
+    )
+    """A walk to the goal of the map below, or a pendulum that a weak motor swings up."""
+    map: MapText = WORLD.text(MAPS["cliff"], "Map", rows=8)
+    """S start, G goal, # wall, C cliff, . free; a last row of digits is wind, upwards."""
+    brush: str = WORLD.choice(
+        "G",
+        {"G": "moves the goal", "S": "moves the start", "#": "walls up", "C": "makes cliff"},
+        "A click on a cell",
+        effect="live",
+    )
+    """And walls or cliff clicked once more are free again."""
+    kings: bool = WORLD.toggle(False, "King's moves", effect="restart")
+    """Diagonal steps too: eight controls instead of four."""
+    slip: float = WORLD.knob(0.0, 0.0, 0.5, r"p_{slip}", "", "Slip", step=0.01)
+    """Probability that a step on the grid goes wherever it likes."""
+    gamma: float = WORLD.knob(1.0, 0.0, 1.0, r"\gamma", "", "Discount", step=0.01)
+    """Of the next step's cost. The pendulum's task never ends: 0.99 at most there."""
+    effort: float = WORLD.knob(0.05, 0.0, 1.0, "w_u", "1/(N·m)²", "Price of torque", scale="log")
+    """In the pendulum's cost, dt (e² + 0.05 v² + w_u τ²)."""
+    anywhere: bool = WORLD.toggle(False, "Start anywhere")
+    """Episodes begin in any state instead of the start."""
+
+    method: str = LEARNING.choice("q-learning", LEARNING_METHODS, "Method", effect="restart")
     """Blue in the scene."""
     second: str = LEARNING.choice(
-        "sarsa", {"none": "None", **METHODS}, "Second method", effect="restart"
+        "sarsa", {"none": "None", **LEARNING_METHODS}, "Second method", effect="restart"
     )
     """Orange. Both begin with the same luck."""
     n: float = LEARNING.knob(4, 1, 20, "n", "", "Steps", step=1)
@@ -57,7 +91,7 @@ class LearningParams(TaskParams):
     """Of every Q. Below the truth is optimistic, above pessimistic."""
     episodes: float = LEARNING.knob(500, BATCHES, 2000, "K", "", "Episodes", scale="log")
     """Of one training, each of ten learners (pendulum: five); in about 250 batches."""
-    explorer: str = EXPLORATION.choice("epsilon-greedy", EXPLORERS, "Exploration")
+    explorer: str = EXPLORATION.choice("epsilon-greedy", EXPLORATIONS, "Exploration")
     """Who decides while learning. The other controller walks along the top row, or is PD."""
     epsilon: float = EXPLORATION.knob(
         0.1, 0.0, 1.0, r"\varepsilon", "", "Chance of any control", step=0.01
@@ -72,6 +106,21 @@ class LearningParams(TaskParams):
     bound: float = EXPLORATION.knob(1.0, 0.0, 100.0, "L", "", "Confidence", scale="log")
     """Width of the confidence bound, in units of cost."""
 
+    shown: str = VIEW.choice("first", {"first": "First", "second": "Second"}, "Values of method")
+    """Whose estimates colour the scene and the maps."""
+    learner: float = VIEW.knob(1, 1, 10, "s", "", "Learner", step=1)
+    """Which of those who learn side by side is shown."""
+    control: float = VIEW.knob(0, 0, 8, r"u_{map}", "", "Control of the map", step=1)
+    """The map of Q shows this control; 0: the best in each state."""
+
+    @property
+    def task(self) -> LearningTask:
+        """What is to be learned."""
+        if self.system == "pendulum":
+            gamma = min(self.gamma, LARGEST_GAMMA)
+            return pendulum_task(gamma, self.effort, self.anywhere)
+        return grid_task(self.map, self.kings, self.slip, self.gamma, self.anywhere)
+
     @property
     def methods(self) -> list[str]:
         """The names of one or two methods."""
@@ -80,17 +129,32 @@ class LearningParams(TaskParams):
     @property
     def kinds(self) -> list[int]:
         """The same as the algorithms number them."""
-        return [list(METHODS).index(name) for name in self.methods]
+        return [list(LEARNING_METHODS).index(name) for name in self.methods]
 
-    def behavior(self, task: Task) -> Behavior:
+    @property
+    def learners(self) -> int:
+        """Of each method."""
+        return LEARNERS[self.system]
+
+    @property
+    def view(self) -> tuple[int, int]:
+        """Which method's learner is shown, and which of its learners."""
+        second = self.shown == "second" and self.second != "none"
+        return int(second), min(round(self.learner), self.learners) - 1
+
+    @property
+    def behaviour(self) -> BehaviourPolicy:
         """Who decides while learning."""
-        kind = list(EXPLORERS).index(self.explorer)
+        kind = list(EXPLORATIONS).index(self.explorer)
         follows = kind == exploration.FOLLOW
-        policy = task.teacher if follows else np.zeros(0, np.int64)
-        return Behavior(kind, self.epsilon, self.fading, self.beta, self.bound, policy)
+        policy = self.task.teacher if follows else np.zeros(0, np.int64)
+        return BehaviourPolicy(kind, self.epsilon, self.fading, self.beta, self.bound, policy)
 
-    def rule(self, task: Task) -> Rule:
+    @property
+    def rule(self) -> UpdateRule:
         """How estimates move."""
-        limit = DIVERGED * max(1.0, float(np.abs(task.mdp.C).max()))
+        limit = DIVERGED * max(1.0, self.task.mdp.largest_cost)
         n = round(self.n)
-        return Rule(self.alpha, self.omega, n, self.decay, self.replacing, self.offline, limit)
+        return UpdateRule(
+            self.alpha, self.omega, n, self.decay, self.replacing, self.offline, limit
+        )

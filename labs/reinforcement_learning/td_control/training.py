@@ -9,7 +9,8 @@ is a mapping of arrays, M methods with S learners each, after k batches of episo
     lengths (M,)               transitions of an episode, the mean of the last batch
     episodes (k,)              each learner's episodes so far
     online (M, S, k)           mean discounted cost of a batch's episodes: what learning cost
-    offline (M, S, k)          cost of the greedy policy after it: what was learned
+    offline (M, S, k)          cost of the greedy policy after it: what was learned; where neither
+                               luck nor gamma = 1 forbids it without end, else of cut episodes
     off, most (M, S, k)        root mean square and largest of |Q - Q*|
 """
 
@@ -17,24 +18,27 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from labs.algorithms.exploration import Behavior
-from labs.algorithms.sarsa_lambda import FAINT
+from labs.algorithms.exploration import BehaviourPolicy
+from labs.algorithms.policy_evaluation import exact
+from labs.algorithms.sarsa_lambda import NEGLIGIBLE_TRACE
 from labs.algorithms.td_control import SARSA_LAMBDA, Learners, greedy_costs, init, step
-from labs.problems.episodes import Rule
-from labs.reinforcement_learning.td_control.tasks import Task
+from labs.problems.episodes import UpdateRule
+from labs.reinforcement_learning.td_control.tasks import LearningTask
 
 Training = Mapping[str, np.ndarray]
 CURVES = ("online", "offline", "off", "most")
-STEP, TRACE, BUDGET = 40.0, 2.5, 4e6
+STEP_TIME, TRACE_TIME, BUDGET = 40.0, 2.5, 4e6
 """[ns] About what a transition takes, a trace at each transition, and what a batch may take for
 the scene to go on."""
-TRIALS = 20
+EVALUATIONS = 20
 """Of a greedy policy where luck has a say in what it costs."""
 KEPT = 1000
 """Batches whose curves are kept; older ones are dropped."""
 
 
-def begin(task: Task, methods: int, seeds: int, rng: np.random.Generator, q0: float) -> Training:
+def initial_training(
+    task: LearningTask, methods: int, seeds: int, rng: np.random.Generator, q0: float
+) -> Training:
     """Nothing learned yet: Q = q0 everywhere."""
     learners = init((task.mdp.X, task.mdp.U), seeds, rng, q0)
     return {
@@ -43,40 +47,40 @@ def begin(task: Task, methods: int, seeds: int, rng: np.random.Generator, q0: fl
         "random": np.stack([learners.random] * methods),
         "cells": task.cells,
         "sound": np.array(True),
-        "lengths": np.full(methods, float(task.practice.horizon)),
+        "lengths": np.full(methods, float(task.learning.horizon)),
         "episodes": np.zeros(0),
     } | {name: np.zeros((methods, seeds, 0)) for name in CURVES}
 
 
-def learners_of(training: Training, method: int) -> Learners:
+def _learners(training: Training, method: int) -> Learners:
     """The learners of one of the methods."""
     q, visits, random = (training[name][method] for name in ("q", "visits", "random"))
     none = np.zeros((len(q), 0))
     return Learners(q, visits, random, none, none.astype(np.int64), bool(training["sound"]))
 
 
-def further(
-    task: Task,
-    behavior: Behavior,
-    rule: Rule,
+def train(
+    task: LearningTask,
+    behaviour: BehaviourPolicy,
+    rule: UpdateRule,
     methods: Sequence[int],
     training: Training,
     episodes: int,
 ) -> Training:
     """The training after a batch of so many further episodes."""
     after = [
-        step(task.practice, behavior, rule, method, learners_of(training, m), episodes)
+        step(task.learning, behaviour, rule, method, _learners(training, m), episodes)
         for m, method in enumerate(methods)
     ]
-    trials = 1 if task.mdp.deterministic else TRIALS
+    trials = 1 if task.mdp.deterministic else EVALUATIONS
     errors = np.array([[task.errors(q) for q in learners.q] for learners in after])
     points = {
         "online": np.array([learners.costs.mean(axis=1) for learners in after]),
-        "offline": np.array([greedy_costs(task.trial, learners, trials) for learners in after]),
+        "offline": np.array([_offline(task, learners, trials) for learners in after]),
         "off": errors[..., 0],
         "most": errors[..., 1],
     }
-    done = trained(training) + episodes
+    done = episodes_done(training) + episodes
     return {
         "q": np.stack([learners.q for learners in after]),
         "visits": np.stack([learners.visits for learners in after]),
@@ -91,30 +95,45 @@ def further(
     }
 
 
-def batch(task: Task, rule: Rule, methods: Sequence[int], training: Training, most: int) -> int:
+def _offline(task: LearningTask, learners: Learners, trials: int) -> np.ndarray:
+    """(S,) from the start. An episode that is cut costs less than the policy does, and may cost
+    less than the best."""
+    if task.mdp.deterministic and task.mdp.gamma < 1.0:
+        policies = learners.q.argmin(axis=2)
+        return np.array([exact(task.mdp, policy)[task.start] for policy in policies])
+    return greedy_costs(task.evaluation, learners, trials)
+
+
+def batch_size(
+    task: LearningTask, rule: UpdateRule, methods: Sequence[int], training: Training, most: int
+) -> int:
     """Episodes of the next batch: `most`, or fewer while they are so long that it would take more
     than the budget. Transitions are counted, not seconds: all machines do the same."""
     seeds, load = training["q"].shape[1], 0.0
-    fading = task.mdp.gamma * rule.decay
-    memory = np.log(FAINT) / np.log(fading) if 0.0 < fading < 1.0 else task.q_star.size * fading
+    fading = task.mdp.gamma * rule.trace_decay
+    memory = (
+        np.log(NEGLIGIBLE_TRACE) / np.log(fading)
+        if 0.0 < fading < 1.0
+        else task.q_star.size * fading
+    )
     for method, length in zip(methods, training["lengths"], strict=True):
         traces = min(length, memory, task.q_star.size) if method == SARSA_LAMBDA else 0.0
-        load += seeds * length * (STEP + TRACE * traces)
+        load += seeds * length * (STEP_TIME + TRACE_TIME * traces)
     return int(np.clip(BUDGET / max(load, 1.0), 1, most))
 
 
-def trained(training: Training) -> int:
+def episodes_done(training: Training) -> int:
     """Each learner's episodes so far."""
     return int(training["episodes"][-1]) if len(training["episodes"]) else 0
 
 
-def fits(training: Training, task: Task) -> bool:
+def fits_task(training: Training, task: LearningTask) -> bool:
     """Whether its tables are those of this task's states and controls."""
     same = training["q"].shape[2:] == task.q_star.shape
     return same and np.array_equal(training["cells"], task.cells)
 
 
-def moved(training: Training, task: Task, q0: float) -> Training:
+def transfer(training: Training, task: LearningTask, q0: float) -> Training:
     """The training on a map that was changed: what was learned of a cell stays with the cell."""
     places = {tuple(cell): x for x, cell in enumerate(training["cells"].tolist())}
     shared = [(x, places[c]) for x, c in enumerate(map(tuple, task.cells.tolist())) if c in places]

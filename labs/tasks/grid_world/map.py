@@ -15,9 +15,9 @@ Learning, 2nd edition, examples 4.1, 6.6 and 6.5), and a room with walls. States
 that are neither wall nor cliff, numbered along the rows.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -101,7 +101,7 @@ class GridWorld:
         lines = [*self.rows, "".join(map(str, self.wind))] if any(self.wind) else self.rows
         return "\n".join(lines)
 
-    def changed(self, row: int, column: int, kind: str) -> "GridWorld":
+    def with_cell(self, row: int, column: int, kind: str) -> "GridWorld":
         """The world with one cell of another kind; a new start takes the place of the old one,
         and so does a new goal where there was only one. Raises LabError."""
         grid = [list(line) for line in self.rows]
@@ -127,6 +127,18 @@ class GridWorld:
         index = np.full(self.shape, -1)
         index[tuple(self.cells.T)] = np.arange(len(self.cells))
         return index
+
+    def state(self, cell: Sequence[int] | np.ndarray) -> int:
+        """The state of a cell (row, column), on the map or beside it; -1 where there is none."""
+        row, column = map(int, cell)
+        rows, columns = self.shape
+        inside = 0 <= row < rows and 0 <= column < columns
+        return int(self.index[row, column]) if inside else -1
+
+    @cached_property
+    def terminal(self) -> np.ndarray:
+        """(X,) bool: the goals."""
+        return np.array([self.kind(x) == "G" for x in range(len(self.cells))])
 
     @cached_property
     def start(self) -> int:
@@ -166,16 +178,15 @@ class GridWorld:
         """The world as an MDP; with slip in (0, 1] its dynamics are probabilities."""
         successor, cost = self.table
         X, U = cost.shape
-        terminal = np.array([self.kind(x) == "G" for x in range(X)])
         if not slip:
-            return FiniteMDP(cost, gamma, terminal, successor=successor)
+            return FiniteMDP(cost, gamma, self.terminal, successor=successor)
         P = np.zeros((U, X, X))
         for u in range(U):
             np.add.at(P[u], (np.arange(X), successor[:, u]), 1.0 - slip)
             for other in range(U):
                 np.add.at(P[u], (np.arange(X), successor[:, other]), slip / U)
         mixed = (1.0 - slip) * cost + slip * cost.mean(axis=1, keepdims=True)
-        return FiniteMDP(mixed, gamma, terminal, P=P)
+        return FiniteMDP(mixed, gamma, self.terminal, P=P)
 
     def _land(self, x: int, u: int) -> tuple[int, int]:
         """The cell where a step ends."""
@@ -193,3 +204,9 @@ class GridWorld:
     def _open(self, row: int, column: int) -> bool:
         rows, columns = self.shape
         return 0 <= row < rows and 0 <= column < columns and self.rows[row][column] != "#"
+
+
+@lru_cache(maxsize=64)
+def grid_world(text: str, kings: bool) -> GridWorld:
+    """The same world for the same map, so that its tables are computed once. Raises LabError."""
+    return GridWorld.parse(text, kings)

@@ -6,7 +6,7 @@ equation of motion
 
     M(q) q'' + h(q, q') = tau - b q'
 
-is integrated (classical Runge-Kutta, steps of at most LONGEST), and the state reached is moved to
+is integrated (classical Runge-Kutta, steps of at most MAX_STEP), and the state reached is moved to
 the nearest node of the grid: x' = successor[x, u]. Angles run round the circle, velocities are
 cut to [-v_max, v_max]. Hanging is q = 0; upright, the goal, is q = (pi, 0), and it is a node.
 
@@ -27,11 +27,11 @@ from labs.models.pendulums import LENGTH, MASS, RADIUS
 from labs.problems.finite_mdp import FiniteMDP
 
 GRAVITY = 9.81
-LONGEST = 0.025
+MAX_STEP = 0.025
 """[s] the longest step of integration."""
 ABOUT_CENTER = MASS * (LENGTH**2 / 12 + RADIUS**2 / 4)
 """[kg m^2] moment of inertia of a rod about its centre."""
-LARGEST = 20_000_000
+MAX_ENTRIES = 20_000_000
 """Entries of a table, X U, at most."""
 
 
@@ -59,11 +59,11 @@ def acceleration(q: np.ndarray, v: np.ndarray, tau: np.ndarray, friction: float)
     )
 
 
-def advance(
+def integrate_pendulum(
     q: np.ndarray, v: np.ndarray, tau: np.ndarray, friction: float, dt: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """q and v (..., n) a time dt [s] later under held torques."""
-    steps = int(np.ceil(dt / LONGEST - 1e-9))
+    steps = int(np.ceil(dt / MAX_STEP - 1e-9))
     h = dt / steps
     for _ in range(steps):
         a1 = acceleration(q, v, tau, friction)
@@ -111,9 +111,9 @@ class PendulumGrid:
             raise LabError(f"{self.levels} torque levels: an odd number goes")
         if min(self.v_max, self.torque, self.dt) <= 0.0 or self.friction < 0.0:
             raise LabError("v_max, torque and dt are above zero, friction is not below")
-        if self.X * self.U > LARGEST:
+        if self.X * self.U > MAX_ENTRIES:
             raise LabError(
-                f"{self.X} states times {self.U} controls are more than {LARGEST} entries: "
+                f"{self.X} states times {self.U} controls are more than {MAX_ENTRIES} entries: "
                 "take fewer nodes or levels"
             )
 
@@ -178,7 +178,9 @@ class PendulumGrid:
             part = slice(begin, min(begin + chunk, self.X))
             q, v = np.split(self.nodes[part], 2, axis=1)
             columns = [
-                self.state(*advance(q, v, np.broadcast_to(tau, q.shape), self.friction, self.dt))
+                self.state(
+                    *integrate_pendulum(q, v, np.broadcast_to(tau, q.shape), self.friction, self.dt)
+                )
                 for tau in self.torques
             ]
             yield part, np.stack(columns, axis=1)

@@ -295,7 +295,7 @@ def test_few_sweeps_to_go_are_the_first_of_value_iteration() -> None:
 
 
 def test_an_endless_optimum_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(policy_iteration, "MOST", 1)
+    monkeypatch.setattr(policy_iteration, "MAX_IMPROVEMENTS", 1)
     mdp = GridWorld.parse(MAPS["room"]).mdp(0.9)
     with pytest.raises(LabError, match="after 1 improvements"):
         optimum(mdp, random_policy(mdp))

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from labs.algorithms.exploration import BOLTZMANN, CONFIDENCE, FOLLOW, Behavior, choose, greedy
+from labs.algorithms.exploration import (
+    BOLTZMANN,
+    CONFIDENCE,
+    FOLLOW,
+    BehaviourPolicy,
+    choose,
+    greedy,
+)
 from labs.random_numbers import seeded
 
 DRAWS = 20_000
@@ -11,9 +18,11 @@ COSTS = np.array([3.0, 1.0, 2.0, 1.5])
 NEVER = np.zeros(4, np.int32)
 
 
-def frequencies(behavior: Behavior, costs: np.ndarray, visits: np.ndarray = NEVER) -> np.ndarray:
+def frequencies(
+    behaviour: BehaviourPolicy, costs: np.ndarray, visits: np.ndarray = NEVER
+) -> np.ndarray:
     state = seeded(np.random.default_rng(0), 1)[0]
-    drawn = [choose(behavior, 0, costs[None], visits[None], state) for _ in range(DRAWS)]
+    drawn = [choose(behaviour, 0, costs[None], visits[None], state) for _ in range(DRAWS)]
     return np.bincount(drawn, minlength=len(costs)) / DRAWS
 
 
@@ -28,17 +37,21 @@ def test_greedy_breaks_ties_at_random() -> None:
 def test_epsilon_greedy_shares_epsilon_among_all(epsilon: float) -> None:
     expected = np.full(4, epsilon / 4)
     expected[1] += 1 - epsilon
-    np.testing.assert_allclose(frequencies(Behavior(epsilon=epsilon), COSTS), expected, atol=0.012)
+    np.testing.assert_allclose(
+        frequencies(BehaviourPolicy(epsilon=epsilon), COSTS), expected, atol=0.012
+    )
 
 
 def test_boltzmann_is_a_softmax_of_minus_costs() -> None:
     weights = np.exp(-1.7 * COSTS)
-    found = frequencies(Behavior(BOLTZMANN, beta=1.7), COSTS)
+    found = frequencies(BehaviourPolicy(BOLTZMANN, beta=1.7), COSTS)
     np.testing.assert_allclose(found, weights / weights.sum(), atol=0.012)
-    shifted = frequencies(Behavior(BOLTZMANN, beta=1.7), COSTS + 1e4)
+    shifted = frequencies(BehaviourPolicy(BOLTZMANN, beta=1.7), COSTS + 1e4)
     np.testing.assert_allclose(shifted, weights / weights.sum(), atol=0.012)
-    np.testing.assert_allclose(frequencies(Behavior(BOLTZMANN, beta=0.0), COSTS), 0.25, atol=0.012)
-    assert frequencies(Behavior(BOLTZMANN, beta=1e3), COSTS)[1] == 1.0
+    np.testing.assert_allclose(
+        frequencies(BehaviourPolicy(BOLTZMANN, beta=0.0), COSTS), 0.25, atol=0.012
+    )
+    assert frequencies(BehaviourPolicy(BOLTZMANN, beta=1e3), COSTS)[1] == 1.0
 
 
 def test_confidence_takes_the_lowest_bound() -> None:
@@ -46,10 +59,10 @@ def test_confidence_takes_the_lowest_bound() -> None:
     visits = np.array([40, 300, 7, 90], np.int32)
     for bound in (0.0, 0.3, 1.0, 3.0, 30.0):
         lowest = COSTS - bound * np.sqrt(2 * np.log(1 + visits.sum()) / visits)
-        behavior = Behavior(CONFIDENCE, bound=bound)
-        assert choose(behavior, 0, COSTS[None], visits[None], state) == np.argmin(lowest)
+        behaviour = BehaviourPolicy(CONFIDENCE, bound=bound)
+        assert choose(behaviour, 0, COSTS[None], visits[None], state) == np.argmin(lowest)
     chosen = {
-        choose(Behavior(CONFIDENCE, bound=b), 0, COSTS[None], visits[None], state)
+        choose(BehaviourPolicy(CONFIDENCE, bound=b), 0, COSTS[None], visits[None], state)
         for b in (0.0, 0.5, 30.0)
     }
     assert chosen == {1, 2}, "the bound changes what is chosen"
@@ -57,7 +70,9 @@ def test_confidence_takes_the_lowest_bound() -> None:
 
 def test_confidence_tries_the_untried_first() -> None:
     visits = np.array([5, 0, 5, 0], np.int32)
-    found = frequencies(Behavior(CONFIDENCE, bound=0.0), np.array([0.0, 9.0, 0.0, 9.0]), visits)
+    found = frequencies(
+        BehaviourPolicy(CONFIDENCE, bound=0.0), np.array([0.0, 9.0, 0.0, 9.0]), visits
+    )
     np.testing.assert_allclose(found, [0, 0.5, 0, 0.5], atol=0.012)
 
 
@@ -65,13 +80,13 @@ def test_confidence_tries_the_untried_first() -> None:
 def test_exploration_fades_with_the_visits_of_a_state(decay: float) -> None:
     """The 25th visit: eps / 25^d."""
     visits = np.array([10, 4, 10, 0], np.int32)
-    astray = 1.0 - frequencies(Behavior(epsilon=0.8, decay=decay), COSTS, visits)[1]
+    astray = 1.0 - frequencies(BehaviourPolicy(epsilon=0.8, decay=decay), COSTS, visits)[1]
     assert astray == pytest.approx(0.75 * 0.8 / 25**decay, abs=0.008)
     weights = np.exp(-0.3 * (1 + np.log(25)) * COSTS)
-    found = frequencies(Behavior(BOLTZMANN, beta=0.3, decay=decay), COSTS, visits)
+    found = frequencies(BehaviourPolicy(BOLTZMANN, beta=0.3, decay=decay), COSTS, visits)
     np.testing.assert_allclose(found, weights / weights.sum(), atol=0.012)
 
 
 def test_following_another_controller() -> None:
-    behavior = Behavior(FOLLOW, epsilon=0.4, policy=np.array([3]))
-    np.testing.assert_allclose(frequencies(behavior, COSTS), [0.1, 0.1, 0.1, 0.7], atol=0.012)
+    behaviour = BehaviourPolicy(FOLLOW, epsilon=0.4, policy=np.array([3]))
+    np.testing.assert_allclose(frequencies(behaviour, COSTS), [0.1, 0.1, 0.1, 0.7], atol=0.012)

@@ -13,11 +13,11 @@ from labs.algorithms.markov_chain import (
     communicating_classes,
     cost_to_go,
     eigenvalues,
-    evaluate,
     is_irreducible,
+    iterate_values,
     long_run,
     mean_costs,
-    stationary,
+    stationary_distribution,
 )
 
 
@@ -105,7 +105,7 @@ def test_the_circle_holds_the_roots_of_the_closed_classes(P: np.ndarray) -> None
 def test_stationary_distributions_are_stationary_and_stay_in_their_class(P: np.ndarray) -> None:
     for c in communicating_classes(P):
         if c.closed:
-            pi = stationary(P, c)
+            pi = stationary_distribution(P, c)
             np.testing.assert_allclose(pi @ P, pi, atol=1e-14)
             assert pi.sum() == pytest.approx(1.0, abs=1e-14)
             assert (pi[c.states] > 0.0).all()
@@ -117,7 +117,9 @@ def test_the_stationary_distribution_of_two_states() -> None:
     P = np.array([[1 - a, a], [b, 1 - b]])
     (c,) = communicating_classes(P)
     # To all digits although the classes almost fall apart.
-    np.testing.assert_allclose(stationary(P, c), [b / (a + b), a / (a + b)], rtol=1e-15)
+    np.testing.assert_allclose(
+        stationary_distribution(P, c), [b / (a + b), a / (a + b)], rtol=1e-15
+    )
     np.testing.assert_allclose(eigenvalues(P), [1.0, 1.0 - a - b], rtol=1e-15)
 
 
@@ -126,7 +128,7 @@ def test_a_ring_has_all_roots_of_one(n: int) -> None:
     (c,) = communicating_classes(ring(n))
     assert (c.period, c.closed) == (n, True)
     np.testing.assert_allclose(eigenvalues(ring(n)) ** n, np.ones(n), atol=1e-12)
-    np.testing.assert_allclose(stationary(ring(n), c), np.full(n, 1 / n), atol=1e-15)
+    np.testing.assert_allclose(stationary_distribution(ring(n), c), np.full(n, 1 / n), atol=1e-15)
 
 
 def test_a_state_nothing_leads_back_to_has_no_period() -> None:
@@ -170,7 +172,7 @@ def test_bellmans_equation_and_the_bound_of_its_iteration(P: np.ndarray, gamma: 
     assert exact.finite.all()
     np.testing.assert_allclose(C + gamma * P @ exact.V, exact.V, atol=1e-10)
     V0 = np.random.default_rng(1).normal(size=len(P))
-    sweeps = list(evaluate(P, C, gamma, V0, exact, 3000))
+    sweeps = list(iterate_values(P, C, gamma, V0, exact, 3000))
     assert sweeps[-1].done.startswith("V is exact")
     assert [bool(s.done) for s in sweeps[:-1]] == [False] * (len(sweeps) - 1)
     last = sweeps[-1]
@@ -188,7 +190,7 @@ def test_the_bound_is_sharp() -> None:
     P, C = ring(3), np.ones(3)
     exact = cost_to_go(P, C, 0.8, communicating_classes(P))
     np.testing.assert_allclose(exact.V, 5.0)
-    last = list(evaluate(P, C, 0.8, np.zeros(3), exact, 50))[-1]
+    last = list(iterate_values(P, C, 0.8, np.zeros(3), exact, 50))[-1]
     np.testing.assert_allclose(last.errors, 5.0 * 0.8 ** np.arange(51), rtol=1e-9)
     assert last.done == "Stopped at k = 50: an error of 7.1e-05 is left."
 
@@ -209,7 +211,7 @@ def test_without_discount_only_what_ends_for_nothing_has_a_value() -> None:
     found = cost_to_go(P, C, 1.0, classes)
     np.testing.assert_array_equal(found.finite, [True, True, True, False, False])
     np.testing.assert_allclose(found.V, [6.0, 0.0, 0.0, 0.0, 0.0])
-    sweeps = list(evaluate(P, C, 1.0, np.zeros(5), found, 30))
+    sweeps = list(iterate_values(P, C, 1.0, np.zeros(5), found, 30))
     assert sweeps[-1].done == "Stopped at k = 30: V has no limit in 2 of 5 states."
     assert len(sweeps[-1].errors) == len(sweeps[-1].bounds) == 0
     # It grows by the mean cost of a step in the long run.

@@ -11,7 +11,7 @@ from labs.algorithms.markov_chain import (
     absorption,
     communicating_classes,
     cost_to_go,
-    evaluate,
+    iterate_values,
     long_run,
 )
 from labs.problems.finite_mdp import FiniteMDP
@@ -98,7 +98,7 @@ def test_costs_without_discount_are_finite_where_they_are_and_exact(seed: int) -
     closed = closed_classes(P)
     costly = [x for c in closed if C[c].any() for x in c]
     hops = np.linalg.matrix_power(np.eye(len(P), dtype=bool) | (P > 0.0), len(P))
-    finite = ~hops[:, costly].any(axis=1)
+    finite: np.ndarray = hops[:, costly].sum(axis=1) == 0
     found = cost_to_go(P, C, 1.0, communicating_classes(P))
     np.testing.assert_array_equal(found.finite, finite)
     np.testing.assert_array_equal(np.isfinite(found.known), finite)
@@ -154,16 +154,16 @@ def test_nine_digits_are_relative_to_the_values() -> None:
     np.testing.assert_allclose(exact.V, [1e-5, 0.0], rtol=1e-15)
     for scale in (1.0, 1e-9, 1e9):
         wanted = cost_to_go(P, scale * C, 1.0, communicating_classes(P))
-        last = list(evaluate(P, scale * C, 1.0, np.zeros(2), wanted, 1000))[-1]
+        last = list(iterate_values(P, scale * C, 1.0, np.zeros(2), wanted, 1000))[-1]
         assert last.done == "V is exact to nine digits of its largest entry, k = 197."
         np.testing.assert_allclose(last.V, [scale * 1e-5, 0.0], rtol=1e-9)
 
 
 def test_what_costs_nothing_is_exact_after_a_sweep() -> None:
     exact = cost_to_go(np.eye(2), np.zeros(2), 0.5, communicating_classes(np.eye(2)))
-    (only,) = evaluate(np.eye(2), np.zeros(2), 0.5, np.zeros(2), exact, 9)
+    (only,) = iterate_values(np.eye(2), np.zeros(2), 0.5, np.zeros(2), exact, 9)
     assert only.done.startswith("V is exact")
-    *_, last = evaluate(np.eye(2), np.zeros(2), 0.5, np.ones(2), exact, 99)
+    *_, last = iterate_values(np.eye(2), np.zeros(2), 0.5, np.ones(2), exact, 99)
     assert last.done.startswith("V is exact")
     assert last.V.max() <= 1e-9
 

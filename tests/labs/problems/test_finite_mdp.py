@@ -70,6 +70,15 @@ def test_sampling_follows_the_probabilities() -> None:
     np.testing.assert_array_equal(mdp.cumulative[..., -1], 1.0)
 
 
+def test_what_rounding_leaves_of_a_row_leads_to_no_impossible_state() -> None:
+    P = np.full((1, 11, 11), 0.1)
+    P[..., -1] = 0.0
+    assert P[0, 0].cumsum()[-1] < 1.0
+    mdp = FiniteMDP(np.ones((11, 1)), 0.5, np.zeros(11, bool), P=P)
+    np.testing.assert_array_equal(mdp.cumulative[0, :, -2:], 1.0)
+    assert mdp.cumulative[0, 0, -3] == pytest.approx(0.9)
+
+
 CHANGES: list[tuple[dict[str, Any], str]] = [
     ({"C": np.ones(4)}, "shape"),
     ({"C": np.where(np.eye(4)[:, :2] == 1.0, np.nan, 0.0)}, "control 0 in state 0 is nan"),
@@ -104,6 +113,9 @@ def test_wrong_probabilities_are_named() -> None:
             replace(three(), successor=None, P=P)
     P = good.copy()
     P[1, 2] = [1.0, 0.0, 0.0, 0.0]
+    with pytest.raises(LabError, match="state 2 is terminal, yet control 1 leads out"):
+        replace(three(), successor=None, P=P)
+    P[1, 2] = [1e-12, 0.0, 1.0 - 1e-12, 0.0]
     with pytest.raises(LabError, match="state 2 is terminal, yet control 1 leads out"):
         replace(three(), successor=None, P=P)
     with pytest.raises(LabError, match="P has shape"):

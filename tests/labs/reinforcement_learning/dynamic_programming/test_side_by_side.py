@@ -13,32 +13,33 @@ from labs.reinforcement_learning.dynamic_programming import side_by_side
 from labs.reinforcement_learning.dynamic_programming.side_by_side import (
     GIVEN_UP,
     RANDOM,
-    Rules,
-    Standing,
-    account,
-    curves,
+    Iterates,
+    IterationSettings,
+    convergence_curves,
+    initial_iterates,
+    iteration_report,
     passes,
     progress,
-    start,
 )
+from labs.rounding import rounded_up
 from tests.labs.algorithms.random_mdps import random_mdp
 
-RULES = Rules(3, 1e-8)
+SETTINGS = IterationSettings(3, 1e-8)
 
 
-def race(gamma: float = 0.95) -> tuple[FiniteMDP, Standing, np.ndarray]:
+def race(gamma: float = 0.95) -> tuple[FiniteMDP, Iterates, np.ndarray]:
     """A random MDP, the start of all four under the random policy, and their limits."""
     mdp = random_mdp(5, X=12, U=3, gamma=gamma, deterministic=True, ends=False)
     best, _, _ = optimum(mdp, np.zeros(12, np.int64))
     limits = np.stack([policy_evaluation.exact(mdp, random_policy(mdp)), best, best, best])
     policy = np.zeros((4, 12), np.int16)
     policy[:2] = RANDOM
-    return mdp, start(mdp, np.zeros((4, 12)), policy, limits), limits
+    return mdp, initial_iterates(mdp, np.zeros((4, 12)), policy, limits), limits
 
 
 def test_each_goes_as_if_it_were_alone() -> None:
     mdp, at, limits = race()
-    *_, (last, _) = passes(mdp, at, RULES, limits)
+    *_, (last, _) = passes(mdp, at, SETTINGS, limits)
     V, evenly = np.zeros(12), random_policy(mdp)
     alone = [
         list(policy_evaluation.iterate(mdp, V, evenly, 1e-8)),
@@ -54,15 +55,18 @@ def test_each_goes_as_if_it_were_alone() -> None:
         np.testing.assert_array_equal(last.errors[len(sweeps) :, i], errors[-1])
         made = [sweep.backups for sweep in sweeps]
         np.testing.assert_array_equal(last.backups[1 : len(sweeps) + 1, i], made)
-    assert last.verdict == "All four iterations have converged."
-    assert not at.verdict
+    assert last.stop_reason == (
+        "All four iterations have converged: the largest distance left is "
+        f"{rounded_up(last.errors[-1].max())}."
+    )
+    assert not at.stop_reason
 
 
 def test_passes_grow_and_are_no_longer_than_they_may_be(monkeypatch: pytest.MonkeyPatch) -> None:
     mdp, at, limits = race(0.99)
 
     def lengths() -> list[int]:
-        made = [1] + [len(now.errors) for now, _ in passes(mdp, at, RULES, limits)]
+        made = [1] + [len(now.errors) for now, _ in passes(mdp, at, SETTINGS, limits)]
         return np.diff(made).tolist()
 
     usual = lengths()
@@ -75,7 +79,7 @@ def test_passes_grow_and_are_no_longer_than_they_may_be(monkeypatch: pytest.Monk
 
 def test_the_seconds_are_those_of_the_pass() -> None:
     mdp, at, limits = race()
-    spent = np.array([seconds for _, seconds in passes(mdp, at, RULES, limits)])
+    spent = np.array([seconds for _, seconds in passes(mdp, at, SETTINGS, limits)])
     assert (spent[0] > 0.0).all()
     assert (spent >= 0.0).all()
     assert (spent[-1] == 0.0).any(), "who is done spends nothing"
@@ -83,9 +87,9 @@ def test_the_seconds_are_those_of_the_pass() -> None:
 
 def test_progress_counts_decades_and_says_nothing_of_policy_iteration() -> None:
     mdp, at, limits = race()
-    stands = [now for now, _ in passes(mdp, at, RULES, limits)]
-    parts = [progress(now, RULES.tolerance) for now in stands]
-    assert progress(at, RULES.tolerance) == 0.0
+    stands = [now for now, _ in passes(mdp, at, SETTINGS, limits)]
+    parts = [progress(now, SETTINGS.tolerance) for now in stands]
+    assert progress(at, SETTINGS.tolerance) == 0.0
     assert parts[-1] == 1.0
     alone = [[i for i in range(4) if not now.done[i]] == [1] for now in stands]
     assert any(alone)
@@ -99,19 +103,19 @@ def test_progress_counts_decades_and_says_nothing_of_policy_iteration() -> None:
 
 
 def test_an_iteration_without_end_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(side_by_side, "MOST", 65)
+    monkeypatch.setattr(side_by_side, "MAX_SWEEPS", 65)
     mdp, at, limits = race(0.999)
-    *_, (last, _) = passes(mdp, at, RULES, limits)
+    *_, (last, _) = passes(mdp, at, SETTINGS, limits)
     assert (last.count[[0, 3]] == 65).all()
     assert last.done[0] == f"{GIVEN_UP} after 65 sweeps."
-    assert "Policy evaluation: given up after 65 sweeps." in last.verdict
+    assert "Policy evaluation: given up after 65 sweeps." in last.stop_reason
 
 
 def test_what_each_took_is_told() -> None:
     mdp, at, limits = race()
-    assert account(at, {}).count("0 sweeps, 0 backups. On its way.") == 4
-    *_, (last, _) = passes(mdp, at, RULES, limits)
-    lines = account(last, {"value": 0.0123}).splitlines()
+    assert iteration_report(at, {}).count("0 sweeps, 0 backups. On its way.") == 4
+    *_, (last, _) = passes(mdp, at, SETTINGS, limits)
+    lines = iteration_report(last, {"value": 0.0123}).splitlines()
     assert lines[3].startswith(f"Value iteration: {last.count[3]} sweeps, ")
     assert " backups, 12.3 ms. " in lines[3]
     assert " ms" not in lines[0]
@@ -119,9 +123,9 @@ def test_what_each_took_is_told() -> None:
 
 def test_curves_are_thinned_but_keep_their_ends() -> None:
     mdp, at, limits = race(0.99)
-    *_, (last, _) = passes(mdp, at, RULES, limits)
-    found = curves(last, mdp.gamma, 50)
-    for i, method in enumerate(side_by_side.METHODS):
+    *_, (last, _) = passes(mdp, at, SETTINGS, limits)
+    found = convergence_curves(last, mdp.gamma, 50)
+    for i, method in enumerate(side_by_side.ITERATION_METHODS):
         sweeps = found[f"sweep_{method}"]
         assert len(sweeps) <= 50
         assert (sweeps[0], sweeps[-1]) == (0.0, last.count[i])

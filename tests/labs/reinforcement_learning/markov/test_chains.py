@@ -12,22 +12,22 @@ from labs.errors import LabError
 from labs.reinforcement_learning.markov.chains import (
     CHAINS,
     TITLES,
+    chain_table,
     parse_rows,
     random_chain,
-    shifted,
-    table_of,
+    shift_probability,
     with_probability,
     with_rows,
     write_rows,
 )
 from labs.reinforcement_learning.markov.graph import (
-    bead,
-    on_the_way,
-    places,
-    probability,
+    bead_place,
+    probability_at,
     ribbon,
+    ribbon_points,
     ribbons,
-    way,
+    state_places,
+    token_place,
 )
 from labs.reinforcement_learning.markov.reward_process import Edit, RewardProcess, reward_process
 
@@ -35,7 +35,7 @@ NONE = Edit({}, 0, 0, 0.0)
 
 
 def process(name: str, first: float = 1.0, edit: Edit = NONE) -> RewardProcess:
-    return reward_process(table_of(name, 1, "state, A\nA, 1"), first, edit)
+    return reward_process(chain_table(name, 1, "state, A\nA, 1"), first, edit)
 
 
 def test_every_title_has_its_chain() -> None:
@@ -94,9 +94,9 @@ def test_one_that_had_all_gives_by_the_chains_own_proportions() -> None:
 
 
 def test_a_shift_reaches_never_and_always() -> None:
-    assert [shifted(0.4, s) for s in (-1.0, 0.0, 1.0)] == [0.0, 0.4, 1.0]
-    assert shifted(0.4, 0.5) == pytest.approx(0.7)
-    assert shifted(0.4, -0.5) == pytest.approx(0.2)
+    assert [shift_probability(0.4, s) for s in (-1.0, 0.0, 1.0)] == [0.0, 0.4, 1.0]
+    assert shift_probability(0.4, 0.5) == pytest.approx(0.7)
+    assert shift_probability(0.4, -0.5) == pytest.approx(0.2)
 
 
 def test_rows_survive_as_text() -> None:
@@ -146,7 +146,7 @@ def test_edits_act_where_they_fit_and_only_without_controls() -> None:
     lights = process("lights", edit=Edit(rows, 1, 3, 0.5))
     np.testing.assert_array_equal(lights.P[0], rows[0])
     np.testing.assert_allclose(lights.P[1], [0.0, 0.0, 0.5, 0.5])
-    np.testing.assert_array_equal(lights.own, process("lights").P)
+    np.testing.assert_array_equal(lights.unedited, process("lights").P)
     assert lights.beads(1, 0) == [0, 2, 3]
     for edit in (Edit(rows, 9, 1, 0.5), Edit(rows, 1, 9, 0.5)):
         np.testing.assert_array_equal(process("student", edit=edit).P, process("student").P)
@@ -157,7 +157,7 @@ def test_edits_act_where_they_fit_and_only_without_controls() -> None:
 
 
 def test_states_that_are_left_for_good() -> None:
-    assert process("doors").passing.tolist() == [True, False, False, False, False]
+    assert process("doors").transient.tolist() == [True, False, False, False, False]
 
 
 # The graph
@@ -165,7 +165,7 @@ def test_states_that_are_left_for_good() -> None:
 
 @pytest.mark.parametrize("n", [1, 2, 3, 12])
 def test_states_lie_apart(n: int) -> None:
-    where = places(n)
+    where = state_places(n)
     assert np.isfinite(where).all()
     for a, b in itertools.combinations(where, 2):
         assert np.linalg.norm(a - b) > 0.35
@@ -173,19 +173,19 @@ def test_states_lie_apart(n: int) -> None:
 
 @pytest.mark.parametrize(("x", "y"), [(0, 1), (1, 0), (2, 5), (3, 3)])
 def test_a_bead_is_found_where_it_is_put(x: int, y: int) -> None:
-    where = places(6)
+    where = state_places(6)
     for p in (0.0, 0.01, 0.37, 0.5, 1.0):
-        assert probability(where, x, y, bead(where, x, y, p)) == pytest.approx(p)
+        assert probability_at(where, x, y, bead_place(where, x, y, p)) == pytest.approx(p)
 
 
 def test_there_and_back_are_two_ribbons() -> None:
-    where, s = places(6), np.linspace(0.0, 1.0, 50)
-    there, back = way(where, 0, 2, s), way(where, 2, 0, s)
+    where, s = state_places(6), np.linspace(0.0, 1.0, 50)
+    there, back = ribbon_points(where, 0, 2, s), ribbon_points(where, 2, 0, s)
     assert np.linalg.norm(there[25] - back[25]) > 0.2
 
 
 def test_a_ribbon_is_as_wide_as_it_is_probable() -> None:
-    where = places(4)
+    where = state_places(4)
 
     def width(p: float) -> float:
         left, right = ribbon(where, 0, 2, p)
@@ -197,7 +197,7 @@ def test_a_ribbon_is_as_wide_as_it_is_probable() -> None:
 
 def test_ribbons_make_one_strip() -> None:
     P = np.array([[0.5, 0.5], [1.0, 0.0]])
-    strip, source = ribbons(places(2), P, P > 0.0)
+    strip, source = ribbons(state_places(2), P, P > 0.0)
     assert strip.shape[0] == 2
     assert strip.shape[1] == len(source)
     assert np.isfinite(strip).all()
@@ -209,8 +209,8 @@ def test_ribbons_make_one_strip() -> None:
 
 @pytest.mark.parametrize(("x", "y"), [(0, 1), (4, 2), (3, 3)])
 def test_a_token_goes_from_state_to_state(x: int, y: int) -> None:
-    where = places(6)
-    start, middle, end = (on_the_way(where, x, y, s) for s in (0.0, 0.5, 1.0))
+    where = state_places(6)
+    start, middle, end = (token_place(where, x, y, s) for s in (0.0, 0.5, 1.0))
     np.testing.assert_allclose(start[:2], where[x, :2], atol=1e-12)
     np.testing.assert_allclose(end[:2], where[y, :2], atol=1e-12)
     assert middle[2] > start[2] == end[2]

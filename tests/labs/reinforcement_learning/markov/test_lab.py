@@ -13,8 +13,10 @@ from labs.errors import ParameterError
 from labs.lab import Inputs
 from labs.params import Value
 from labs.reinforcement_learning.markov.chains import CHAINS
-from labs.reinforcement_learning.markov.graph import bead
-from labs.reinforcement_learning.markov.lab import GAMMAS, MOST, Markov, MarkovParams
+from labs.reinforcement_learning.markov.graph import bead_place
+from labs.reinforcement_learning.markov.lab import Markov
+from labs.reinforcement_learning.markov.params import MAX_SHOWN_STATES, MarkovParams
+from labs.reinforcement_learning.markov.plots import GAMMAS
 from labs.reinforcement_learning.markov.reward_process import RewardProcess
 from labs.scene import NullScene
 from tests.labs.experiments import Experiments
@@ -68,7 +70,7 @@ def test_where_the_weeks_go(setting: Mapping[str, Value]) -> None:
     assert MarkovParams().process.P[4, 4] == pytest.approx(0.8)
     assert 0.2 < measured(late)["visits_off"] < 2.5
     # From any start.
-    far = MarkovParams().process.far
+    far = MarkovParams().process.long_run
     np.testing.assert_allclose(far, np.tile(far[0], (6, 1)), atol=1e-12)
     after = np.linalg.matrix_power(MarkovParams().process.P, 15)
     off = 50 * np.abs(after - far).sum(axis=1)
@@ -116,7 +118,7 @@ def test_one_way_doors(setting: Mapping[str, Value]) -> None:
     assert (np.abs(found - 1.0) < 1e-9).sum() == 2
     assert (np.abs(found + 1.0) < 1e-9).sum() == 1
     assert fields["far"][1:3].sum() == pytest.approx(0.6)
-    assert process_of(world).passing.tolist() == [True, False, False, False, False]
+    assert process_of(world).transient.tolist() == [True, False, False, False, False]
 
 
 @ARTICLE.verify("Myopic or far-sighted")
@@ -132,7 +134,7 @@ def test_myopic_or_far_sighted(setting: Mapping[str, Value]) -> None:
     for gamma in (0.979, setting["gamma"]):
         assert V(float(gamma))[3] < V(float(gamma))[0]
     fields = pictured(run("markov", setting, seconds=0.0))
-    means = np.stack([fields[f"mean_{x}"] for x in range(1, 7)], axis=1)
+    means = fields["means"]
     np.testing.assert_allclose(means[0], V(0.0), atol=1e-12)
     assert (GAMMAS[0], GAMMAS[-1]) == (0.0, 1.0)
     np.testing.assert_allclose(means[-1], -0.412, atol=5e-4)
@@ -153,7 +155,8 @@ def test_no_end_no_sum(setting: Mapping[str, Value]) -> None:
     process = process_of(world)
     assert np.linalg.matrix_rank(np.eye(6) - process.P) == 5
     assert "value" not in measured(world)
-    assert len(pictured(world)["exact"]) == len(pictured(world)["error"]) == 0
+    assert np.isnan(pictured(world)["exact"]).all()
+    assert len(pictured(world)["error"]) == 0
 
 
 @ARTICLE.verify("The last week")
@@ -175,7 +178,7 @@ def test_how_long_will_a_gambler_last(setting: Mapping[str, Value]) -> None:
     V = dict(zip(states, pictured(world)["exact"], strict=True))
     expected = {"2 coins": 4.0, "3 coins": 3.0, "1 coin": 3.0, "Broke": 0.0, "Rich": 0.0}
     assert pytest.approx(expected) == V
-    far = process_of(world).far
+    far = process_of(world).long_run
     assert pictured(world)["far"][states.index("Broke")] == pytest.approx(0.5)
     assert far[states.index("3 coins"), states.index("Broke")] == pytest.approx(0.25)
 
@@ -209,7 +212,7 @@ def test_a_bead_sets_its_probability_and_the_others_make_room() -> None:
     world = begun({"shift": 0.5})
     before = process_of(world)
     for p in (0.2, 1.0, 0.35):
-        place = bead(before.where, 0, 4, p)
+        place = bead_place(before.places, 0, 4, p)
         world.hold("bead 5", (float(place[0]), float(place[1]), 0.3))
         row = process_of(world).P[0]
         assert row[4] == pytest.approx(p, abs=1e-4)
@@ -243,7 +246,7 @@ def test_a_token_that_is_set_down_begins_anew() -> None:
     world = begun({"pace": 50.0})
     for _ in range(100):
         world.advance()
-    where = process_of(world).where
+    where = process_of(world).places
     for _ in range(3):
         world.hold("token", (float(where[3, 0]) + 0.05, float(where[3, 1]), 0.7))
         world.advance()
@@ -296,10 +299,10 @@ def test_more_states_than_the_circle_holds_are_refused() -> None:
         rows = [{"state": f"{x}", "to": {f"{x}": 1}} for x in range(n)]
         return json.dumps(rows)
 
-    check = MarkovParams().change({"chain": "table", "table": table(MOST)})
-    assert len(check.process.P) == MOST
+    check = MarkovParams().change({"chain": "table", "table": table(MAX_SHOWN_STATES)})
+    assert len(check.process.P) == MAX_SHOWN_STATES
     with pytest.raises(ParameterError, match="13 states: at most 12"):
-        MarkovParams().change({"table": table(MOST + 1)})
+        MarkovParams().change({"table": table(MAX_SHOWN_STATES + 1)})
 
 
 def test_the_random_chain_has_a_number() -> None:
@@ -351,8 +354,9 @@ def test_a_snapshot_alone_shows_its_iteration() -> None:
     assert len(tenth.errors) == 11
 
 
-def test_lines_beyond_the_last_state_lie_on_its_own() -> None:
-    fields = pictured(begun({"chain": "machine"}))
-    assert all(np.array_equal(fields[f"mean_{x}"], fields["mean_3"]) for x in range(3, MOST + 1))
+def test_every_state_has_a_curve_and_the_chosen_one_is_shown_once_more() -> None:
+    fields = pictured(begun({"chain": "machine", "source": "12"}))
+    assert fields["means"].shape == (len(GAMMAS), 3)
+    np.testing.assert_array_equal(fields["mean"], fields["means"][:, 2], "the last, beyond it")
     chosen = pictured(begun({"source": "4"}))
-    np.testing.assert_array_equal(chosen["mean"], chosen["mean_4"])
+    np.testing.assert_array_equal(chosen["mean"], chosen["means"][:, 3])

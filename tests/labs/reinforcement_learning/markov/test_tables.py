@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from labs.errors import LabError
-from labs.reinforcement_learning.markov.tables import Table, parse
+from labs.reinforcement_learning.markov.tables import Table, parse_table
 
 CHAIN = "state, cost, A, B\nA, 1, 1/2, 0.5\nB, 0, 0, 1\n"
 DECISION = """state, control, cost, A, B
@@ -32,7 +32,7 @@ def same(a: Table, b: Table) -> bool:
 
 
 def test_a_chain() -> None:
-    table = parse(CHAIN)
+    table = parse_table(CHAIN)
     assert (table.states, table.controls) == (("A", "B"), ("",))
     np.testing.assert_array_equal(table.P, [[[0.5, 0.5], [0.0, 1.0]]])
     np.testing.assert_array_equal(table.C, [[1.0], [0.0]])
@@ -40,7 +40,7 @@ def test_a_chain() -> None:
 
 
 def test_a_decision_process_is_one_for_the_algorithms() -> None:
-    table = parse(DECISION)
+    table = parse_table(DECISION)
     assert table.controls == ("stay", "go")
     np.testing.assert_allclose(table.P, [[[1.0, 0.0], [0.0, 1.0]], [[0.2, 0.8], [0.0, 1.0]]])
     np.testing.assert_array_equal(table.C, [[1.0, 3.0], [0.0, 0.0]])
@@ -64,17 +64,17 @@ def test_a_decision_process_is_one_for_the_algorithms() -> None:
     ids=["tabs", "semicolons", "quoted", "blank lines", "capitals", "json", "json in lines"],
 )
 def test_other_ways_to_write_it(text: str) -> None:
-    assert same(parse(text), parse(DECISION))
+    assert same(parse_table(text), parse_table(DECISION))
 
 
 def test_columns_may_have_any_order_and_costs_may_be_missing() -> None:
-    table = parse("state, B, A\nA, 1, 0\nB, 0.25, 0.75")
+    table = parse_table("state, B, A\nA, 1, 0\nB, 0.25, 0.75")
     np.testing.assert_array_equal(table.P, [[[0.0, 1.0], [0.75, 0.25]]])
     assert not table.C.any()
 
 
 def test_rounded_rows_are_scaled_to_sum_to_one() -> None:
-    table = parse("state, A, B, C\nA, 0.3333333, 0.3333333, 0.3333333\nB,,1,\nC,,,1")
+    table = parse_table("state, A, B, C\nA, 0.3333333, 0.3333333, 0.3333333\nB,,1,\nC,,,1")
     assert table.P[0, 0].sum() == pytest.approx(1.0, abs=1e-15)
 
 
@@ -116,13 +116,13 @@ def test_rounded_rows_are_scaled_to_sum_to_one() -> None:
 )
 def test_a_mistake_is_named(text: str, said: str) -> None:
     with pytest.raises(LabError) as refused:
-        parse(text)
+        parse_table(text)
     assert said in str(refused.value)
 
 
 def test_too_many_states() -> None:
     with pytest.raises(LabError, match="has 2 states: at most 1"):
-        parse(CHAIN, most=1)
+        parse_table(CHAIN, most=1)
 
 
 @given(st.text(st.sampled_from('state,cost;AB01./-"\n\t[]{}:'), max_size=60))
@@ -130,7 +130,7 @@ def test_too_many_states() -> None:
 def test_whatever_is_pasted_is_a_sound_table_or_refused(text: str) -> None:
     for pasted in (text, "state,A\n" + text, '[{"state":"A","to":' + text):
         try:
-            table = parse(pasted)
+            table = parse_table(pasted)
         except LabError:
             continue
         np.testing.assert_allclose(table.P.sum(axis=2), 1.0, atol=1e-12)

@@ -3,21 +3,20 @@
 import numpy as np
 import pytest
 
-from labs.errors import ParameterError
+from labs.reinforcement_learning.td_control.params import TdParams
 from labs.reinforcement_learning.td_control.tasks import (
     KD,
     KP,
-    PATIENCE,
+    LARGEST_GAMMA,
     PENDULUM,
-    Task,
-    TaskParams,
+    LearningTask,
     grid_task,
     pendulum_task,
 )
 from labs.tasks.grid_world.map import MAPS, GridWorld
 
 
-def residual(task: Task) -> float:
+def residual(task: LearningTask) -> float:
     """How far Q* is from a fixed point of Bellman's optimality equation, where it is finite."""
     value = task.q_star.min(axis=1)
     known = np.isfinite(task.q_star).all(axis=1)
@@ -31,7 +30,7 @@ def residual(task: Task) -> float:
 def test_the_optimum_of_a_grid_is_a_fixed_point(name: str, slip: float) -> None:
     task = grid_task(MAPS[name], False, slip, 1.0, True)
     assert residual(task) < 1e-9
-    assert (task.judged == ~task.mdp.terminal).all()
+    assert (task.compared == ~task.mdp.terminal).all()
 
 
 def test_the_published_optima() -> None:
@@ -54,7 +53,9 @@ def test_the_cautious_controller_takes_seventeen_steps_past_the_cliff() -> None:
 
 def test_the_cautious_controller_gives_way_to_walls() -> None:
     task = grid_task("..G\n.#.\nS..", False, 0.0, 1.0, False)
-    assert task.teacher[task.index[2, 1]] == 1, "under the wall it goes aside"
+    assert task.teacher[GridWorld.parse("..G\n.#.\nS..").state((2, 1))] == 1, (
+        "under the wall it goes aside"
+    )
     assert task.teacher[task.start] == 0
 
 
@@ -70,17 +71,17 @@ def test_pd_control_takes_the_level_nearest_to_its_torque() -> None:
 def test_the_pendulum_lies_on_its_map_with_angles_along_the_rows() -> None:
     task = pendulum_task(0.9, 0.05, False)
     q, v = PENDULUM.nodes.T
-    np.testing.assert_allclose(task.laid(q), np.tile(np.pi + PENDULUM.angles, (31, 1)))
-    np.testing.assert_allclose(task.laid(v), np.tile(PENDULUM.velocities[:, None], (1, 41)))
-    assert task.index[tuple(task.cells[7])] == 7
+    np.testing.assert_allclose(task.on_map(q), np.tile(np.pi + PENDULUM.angles, (31, 1)))
+    np.testing.assert_allclose(task.on_map(v), np.tile(PENDULUM.velocities[:, None], (1, 41)))
+    assert task.on_map(np.arange(task.mdp.X))[tuple(task.cells[7])] == 7
 
 
 def test_a_grid_lies_on_its_map_as_it_is_written() -> None:
     world = GridWorld.parse(MAPS["room"])
     task = grid_task(MAPS["room"], False, 0.0, 1.0, False)
     values = np.arange(1.0, task.mdp.X + 1)
-    assert np.array_equal(task.laid(values), world.on_map(values))
-    assert np.array_equal(task.index, world.index)
+    assert np.array_equal(task.on_map(values), world.on_map(values))
+    assert np.array_equal(task.cells, world.cells)
 
 
 def test_errors_are_zero_at_the_optimum_only() -> None:
@@ -96,11 +97,6 @@ def test_errors_are_zero_at_the_optimum_only() -> None:
 
 
 def test_the_pendulum_is_never_entirely_patient() -> None:
-    assert TaskParams(system="pendulum").task.mdp.gamma == PATIENCE
-    assert residual(pendulum_task(PATIENCE, 0.05, True)) < 1e-9
-    assert TaskParams().task.mdp.gamma == 1.0
-
-
-def test_a_bad_map_is_refused_in_a_sentence() -> None:
-    with pytest.raises(ParameterError, match="no goal"):
-        TaskParams().change({"map": "S.."})
+    assert TdParams(system="pendulum").task.mdp.gamma == LARGEST_GAMMA
+    assert residual(pendulum_task(LARGEST_GAMMA, 0.05, True)) < 1e-9
+    assert TdParams().task.mdp.gamma == 1.0

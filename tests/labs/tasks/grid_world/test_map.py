@@ -87,14 +87,14 @@ def test_slip_mixes_the_controls() -> None:
 
 def test_cells_are_edited() -> None:
     world = GridWorld.parse("S.\n.G")
-    assert world.changed(0, 1, "#").text == "S#\n.G"
-    assert world.changed(0, 1, "S").text == ".S\n.G"
-    assert world.changed(0, 1, "G").text == "SG\n.."
-    assert GridWorld.parse("G.\n.G").changed(0, 1, "G").text == "GG\n.G"
+    assert world.with_cell(0, 1, "#").text == "S#\n.G"
+    assert world.with_cell(0, 1, "S").text == ".S\n.G"
+    assert world.with_cell(0, 1, "G").text == "SG\n.."
+    assert GridWorld.parse("G.\n.G").with_cell(0, 1, "G").text == "GG\n.G"
     with pytest.raises(LabError, match="no goal"):
-        world.changed(1, 1, "#")
+        world.with_cell(1, 1, "#")
     with pytest.raises(LabError, match="no start"):
-        world.changed(0, 1, "C").changed(0, 0, ".")
+        world.with_cell(0, 1, "C").with_cell(0, 0, ".")
 
 
 @pytest.mark.parametrize(

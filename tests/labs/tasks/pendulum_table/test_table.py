@@ -12,7 +12,7 @@ from labs.models.pendulums import pendulum
 from labs.tasks.pendulum_table.table import (
     PendulumGrid,
     acceleration,
-    advance,
+    integrate_pendulum,
     pendulum_grid,
     table_size,
 )
@@ -37,7 +37,9 @@ def test_a_time_step_is_the_motion(rods: int) -> None:
         return np.concatenate([x[rods:], acceleration(x[:rods], x[rods:], tau, 0.05)])
 
     exact = solve_ivp(f, (0.0, 0.1), np.concatenate([q, v]), rtol=1e-11, atol=1e-11).y[:, -1]
-    np.testing.assert_allclose(np.concatenate(advance(q, v, tau, 0.05, 0.1)), exact, atol=2e-5)
+    np.testing.assert_allclose(
+        np.concatenate(integrate_pendulum(q, v, tau, 0.05, 0.1)), exact, atol=2e-5
+    )
 
 
 @pytest.mark.parametrize("grid", [PendulumGrid(), PendulumGrid(2, 8, 7, 3)])
@@ -66,7 +68,7 @@ def test_the_table_leads_where_the_motion_leads() -> None:
     for x in (0, 137, 899):
         for u in (0, 5, 8):
             q, v = np.split(grid.nodes[x], 2)
-            q, v = advance(q, v, grid.torques[u], grid.friction, grid.dt)
+            q, v = integrate_pendulum(q, v, grid.torques[u], grid.friction, grid.dt)
             assert grid.successor[x, u] == grid.state(q, v)
     pieces = np.concatenate([rows for _, rows in grid.rows(chunk=100)])
     np.testing.assert_array_equal(pieces, grid.successor)

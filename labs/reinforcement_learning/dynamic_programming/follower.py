@@ -1,0 +1,121 @@
+"""Who follows the policy shown: a walker on the grid world, or the pendulum, from the start to the
+goal (or to where the time is up), over and over."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from labs.reinforcement_learning.dynamic_programming.side_by_side import RANDOM
+from labs.reinforcement_learning.dynamic_programming.tasks import TabularTask
+from labs.tasks.grid_world.map import GridWorld
+from labs.tasks.grid_world.walk import GridWalk, advance_walk, choose_steps, is_on, start_walk
+from labs.tasks.pendulum_table.swing import (
+    Swing,
+    advance_swing,
+    coast,
+    look_up_torques,
+    push,
+    start_swing,
+)
+from labs.tasks.pendulum_table.table import PendulumGrid
+
+PERIOD = 0.01
+"""[s]"""
+MOVE, REST = 30, 100
+"""Periods of a walker's step, and of a rest before it starts anew."""
+LONGEST = 120
+"""Steps after which a walker starts anew."""
+PUSH = 4.0
+"""[rad/s] that a push gives the pendulum."""
+
+
+@dataclass(frozen=True, eq=False)
+class Follower:
+    """Where it is."""
+
+    walk: GridWalk | Swing
+    """Of one walker or pendulum."""
+    draws: int = 0
+    """Decisions and pushes since t = 0: with the seed, what their random numbers are drawn from."""
+    resting: int = 0
+    """Periods left until it starts anew."""
+
+
+def start_follower(task: TabularTask, draws: int = 0) -> Follower:
+    """At the start."""
+    return Follower(_start(task), draws)
+
+
+def follow_policy(
+    task: TabularTask, follower: Follower, policy: np.ndarray | None, seed: int
+) -> Follower:
+    """One PERIOD [s] later. `policy` (X,) says what to do at the next decision; None: nothing is
+    left to do."""
+    if follower.resting == 1:
+        return start_follower(task, follower.draws)
+    if follower.resting:
+        return _rest(task, follower, follower.resting - 1)
+    if follower.walk.clock == 0:
+        if policy is None or _is_over(task, follower.walk):
+            return _rest(task, follower, REST)
+        follower = _decide(task, follower, policy, seed)
+    return replace(follower, walk=_advance(task, follower.walk))
+
+
+def apply_push(task: TabularTask, follower: Follower, seed: int) -> Follower:
+    """The pendulum gets PUSH, a walker finds itself in some other cell."""
+    if isinstance(follower.walk, Swing):
+        return replace(follower, walk=push(follower.walk, PUSH))
+    assert isinstance(task.place, GridWorld)
+    rng = np.random.default_rng((seed, follower.draws))
+    x = int(rng.choice(np.flatnonzero(~task.mdp.terminal)))
+    return Follower(start_walk(task.place, MOVE, start=x), follower.draws + 1)
+
+
+def carry_over(task: TabularTask, follower: Follower) -> Follower:
+    """The same on a task that has changed; at the start where its cells are no longer there."""
+    place, walk = task.place, follower.walk
+    if isinstance(place, GridWorld) and isinstance(walk, GridWalk):
+        fits = is_on(place, walk)
+    else:
+        fits = isinstance(place, PendulumGrid) and isinstance(walk, Swing)
+    return follower if fits else start_follower(task, follower.draws)
+
+
+def _start(task: TabularTask) -> GridWalk | Swing:
+    return start_walk(task.place, MOVE) if isinstance(task.place, GridWorld) else start_swing()
+
+
+def _is_over(task: TabularTask, walk: GridWalk | Swing) -> bool:
+    lost = isinstance(walk, GridWalk) and walk.steps >= LONGEST
+    return lost or bool(task.mdp.terminal[task.state(walk.at[0])])
+
+
+def _decide(task: TabularTask, follower: Follower, policy: np.ndarray, seed: int) -> Follower:
+    walk, place, mdp = follower.walk, task.place, task.mdp
+    if isinstance(walk, Swing):
+        assert isinstance(place, PendulumGrid)
+        walk = look_up_torques(place, mdp, policy[None], walk)
+    else:
+        assert isinstance(place, GridWorld)
+        rng = np.random.default_rng((seed, follower.draws))
+        if policy[0] == RANDOM:
+            policy = np.full(mdp.X, rng.integers(mdp.U))
+        walk = choose_steps(place, mdp, policy[None], walk, rng.random)
+    return replace(follower, walk=walk, draws=follower.draws + 1)
+
+
+def _advance(task: TabularTask, walk: GridWalk | Swing) -> GridWalk | Swing:
+    if isinstance(walk, GridWalk):
+        return advance_walk(walk)
+    assert isinstance(task.place, PendulumGrid)
+    return advance_swing(task.place, walk, PERIOD)
+
+
+def _rest(task: TabularTask, follower: Follower, resting: int) -> Follower:
+    """For a period: a walker stands, the pendulum swings with its motor off."""
+    walk = follower.walk
+    if isinstance(walk, Swing):
+        assert isinstance(task.place, PendulumGrid)
+        walk = coast(task.place, walk, PERIOD)
+    return replace(follower, walk=walk, resting=resting)

@@ -1,0 +1,40 @@
+"""Tunables that the labs on grid worlds have in common: a map to type and to click on."""
+
+from collections.abc import Mapping
+from typing import Annotated
+
+from pydantic import AfterValidator
+
+from labs.errors import LabError, ParameterError
+from labs.params import Value
+from labs.tasks.grid_world.map import GridWorld, grid_world
+from labs.tasks.grid_world.picture import BOARD, board
+
+
+def _is_a_map(text: str) -> str:
+    try:
+        grid_world(text, False)
+    except LabError as error:
+        raise ValueError(str(error)) from None
+    return text
+
+
+MapText = Annotated[str, AfterValidator(_is_a_map)]
+"""The type of a field of Params that holds a map; what is none is refused in a sentence."""
+
+
+def edit_map(
+    world: GridWorld, brush: str, handle: str, point: tuple[float, float, float]
+) -> Mapping[str, Value]:
+    """The field `map` once the board is clicked at `point` [m]: the cell there is of the kind
+    `brush`, or free where it was a wall or a cliff already. Empty where no cell was clicked.
+    Raises ParameterError."""
+    cell = board(world).cell_at(point)
+    if handle != BOARD or cell is None:
+        return {}
+    row, column = cell
+    again = brush in "#C" and world.rows[row][column] == brush
+    try:
+        return {"map": world.with_cell(row, column, "." if again else brush).text}
+    except LabError as error:
+        raise ParameterError(str(error)) from None

@@ -1,0 +1,181 @@
+"""Drawing grid worlds: a board to click on, coloured by cost-to-go, with walls, goals, the cliff
+and the wind, a policy as arrows, the ways it leads and who walks them; and a relief of the values.
+
+Dark is cheap and pale is dear, as in a heat map of the page; what has no value is grey.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from labs.colors import sequential
+from labs.scene import Color, Scene, cell_at, cell_centers
+from labs.tasks.grid_world.map import GridWorld
+from labs.tasks.grid_world.walk import GridWalk
+
+BOARD = "board"
+"""The handle that a click on the board holds."""
+WALL, CLIFF, GOAL = (0.36, 0.38, 0.42), (0.55, 0.12, 0.12), (0.20, 0.66, 0.33)
+NO_VALUE = (0.62, 0.63, 0.65)
+"""Of cells without one."""
+WALKERS: tuple[Color, ...] = ("actual", "reference")
+"""Of the first and the second of those side by side."""
+HEIGHT = 0.55
+"""[m] of the relief at the largest value."""
+LIFT = np.array([0.0, 0.0, 0.012])
+"""[m] Lines and arrows float this far above what they belong to."""
+
+
+@dataclass(frozen=True)
+class Board:
+    """Where the cells of a map lie in the scene."""
+
+    rows: int
+    columns: int
+
+    @property
+    def size(self) -> float:
+        """[m] Side of a cell."""
+        return min(0.24, 2.1 / self.columns, 1.1 / self.rows)
+
+    @property
+    def origin(self) -> tuple[float, float, float]:
+        """[m] The corner of least x and y."""
+        return (-self.size * self.columns / 2, -self.size * self.rows - 0.05, 0.02)
+
+    @cached_property
+    def centers(self) -> np.ndarray:
+        """(rows, columns, 3) [m]."""
+        return cell_centers(self.origin, self.size, self.rows, self.columns)
+
+    @cached_property
+    def relief(self) -> np.ndarray:
+        """(rows, columns, 3) [m]: the places of the cells on the floor of the relief, behind."""
+        places: np.ndarray = self.centers + np.array([0.0, self.size * self.rows + 0.2, 0.0])
+        return places
+
+    def cell_at(self, point: tuple[float, float, float]) -> tuple[int, int] | None:
+        """The (row, column) of the cell at a point [m]; None beside the board."""
+        return cell_at(point, self.origin, self.size, self.rows, self.columns)
+
+
+def board(world: GridWorld) -> Board:
+    """Of a world's map."""
+    return Board(*world.shape)
+
+
+def draw_board(
+    scene: Scene,
+    world: GridWorld,
+    V: np.ndarray,
+    high: float,
+    policy: np.ndarray | None,
+    *,
+    known: np.ndarray | None = None,
+    relief: bool = False,
+) -> None:
+    """Values V (X,), which may be NaN, coloured from 0 to `high` > 0, and a policy, (X,) controls
+    or (X, U) probabilities, if any; of the states in `known` (X,) bool only, if given. With
+    `relief` the values stand behind the board as a surface, too, `high` HEIGHT tall."""
+    place = board(world)
+    heights = _heights(world, V, high)
+    relief = relief and min(world.shape) >= 2
+    _look_at(scene, place.origin, place.relief[0, -1] if relief else place.centers[0, -1])
+    scene.cells(BOARD, place.origin, place.size, _colors(world, V, heights, goals=True))
+    for x in range(len(world.cells)):
+        if world.kind(x) in "SG":
+            corner = place.centers[tuple(world.cells[x])] + place.size * np.array([-0.3, 0.3, 0.1])
+            scene.label(f"cell {x}", world.kind(x), corner)
+    for column, wind in enumerate(world.wind):
+        if wind:
+            below = place.centers[-1, column] - (0.0, 0.8 * place.size, 0.0)
+            scene.label(f"wind {column + 1}", "↑" * wind if wind < 4 else f"{wind}↑", below)
+    shown = ~world.terminal if known is None else known & ~world.terminal
+    _draw_policy(scene, "policy", world, policy, shown, place.centers, place.size)
+    if relief:
+        points = place.relief + heights[..., None] * np.array([0.0, 0.0, 1.0])
+        scene.surface("relief", points, _colors(world, V, heights, goals=False))
+        _draw_policy(scene, "policy on the relief", world, policy, shown, points, place.size)
+        scene.label("values", "cost-to-go V", points[0, world.shape[1] // 2] + [0.0, 0.15, 0.3])
+
+
+def draw_way(
+    scene: Scene, world: GridWorld, cells: np.ndarray, which: int, name: str = "way"
+) -> None:
+    """The way through cells (k, 2), in the colour of the walker number `which`, a little beside
+    those of the others."""
+    if len(cells) >= 2:
+        place = board(world)
+        beside = place.size * np.array([0.1 * (which - 0.5), 0.1 * (which - 0.5), 0.15])
+        points = place.centers[tuple(cells.T)] + beside
+        scene.trail(f"{name} {which + 1}", points, WALKERS[which])
+
+
+def draw_walkers(scene: Scene, world: GridWorld, walk: GridWalk) -> None:
+    """Everybody on the way from one cell to the next; a cell that is no longer on the map is drawn
+    at its edge."""
+    place, part = board(world), walk.clock / walk.move
+    last = np.array(world.shape) - 1
+    begin, end = (place.centers[tuple(np.minimum(at, last).T)] for at in (walk.at, walk.to))
+    for m, center in enumerate((1.0 - part) * begin + part * end):
+        beside = place.size * np.array([0.15 * m, 0.15 * m, 0.3])
+        scene.sphere(f"walker {m + 1}", center + beside, 0.24 * place.size, WALKERS[m])
+
+
+def _look_at(scene: Scene, near: Sequence[float], far: np.ndarray) -> None:
+    """So that what reaches from the corner `near` to `far`, as wide as it is, is in view."""
+    depth = float(far[1]) - near[1]
+    distance = max(-2.0 * near[0], 1.2 * depth)
+    middle = near[1] + 0.5 * depth
+    scene.camera((0.0, middle - 0.5 * distance, 0.6 * distance), (0.0, middle, 0.0))
+
+
+def _heights(world: GridWorld, V: np.ndarray, high: float) -> np.ndarray:
+    """(rows, columns) [m] in proportion to the values; flat where there are none. Walls stand out,
+    and a cliff is a hole."""
+    there = np.where(np.isfinite(V), V, 0.0)
+    heights = world.on_map(np.clip(there / high, -0.2, 1.3) * HEIGHT)
+    return np.where(_is(world, "#"), HEIGHT, heights)
+
+
+def _colors(world: GridWorld, V: np.ndarray, heights: np.ndarray, *, goals: bool) -> np.ndarray:
+    """(rows, columns, 3): by value; walls, the cliff and, if `goals`, those have their own."""
+    colors = sequential(heights, 0.0, HEIGHT)
+    colors[tuple(world.cells[~np.isfinite(V)].T)] = NO_VALUE
+    for sign, color in {"#": WALL, "C": CLIFF, **({"G": GOAL} if goals else {})}.items():
+        colors[_is(world, sign)] = color
+    return colors
+
+
+def _is(world: GridWorld, sign: str) -> np.ndarray:
+    """(rows, columns) bool: the cells of this kind."""
+    return np.asarray(np.array([list(row) for row in world.rows]) == sign)
+
+
+def _draw_policy(
+    scene: Scene,
+    name: str,
+    world: GridWorld,
+    policy: np.ndarray | None,
+    shown: np.ndarray,
+    places: np.ndarray,
+    size: float,
+) -> None:
+    """An arrow in each cell `shown` (X,), or one for each control of a random policy; `places`
+    (rows, columns, 3) [m]."""
+    if policy is None:
+        return
+    if policy.ndim == 1:
+        states = np.flatnonzero(shown)
+        controls = policy[states]
+        back, ahead = -0.28, 0.28
+    else:
+        states, controls = np.nonzero((policy > 0.0) & shown[:, None])
+        back, ahead = 0.05, 0.3
+    down, right = world.moves[controls].T
+    along = size * np.stack([right, -down, 0 * right], axis=1)
+    along = along / np.maximum(np.hypot(down, right), 1.0)[:, None]
+    middles = places[tuple(world.cells[states].T)] + LIFT
+    scene.arrows(name, middles + back * along, middles + ahead * along, "muted")

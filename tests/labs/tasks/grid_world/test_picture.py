@@ -1,0 +1,144 @@
+"""Grid worlds as they are drawn: colours, arrows, and a board that is where one clicks on it."""
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike
+
+from labs.scene import Color, NullScene
+from labs.tasks.grid_world.map import MAPS, GridWorld
+from labs.tasks.grid_world.picture import (
+    CLIFF,
+    GOAL,
+    HEIGHT,
+    NO_VALUE,
+    WALL,
+    board,
+    draw_board,
+    draw_walkers,
+    draw_way,
+)
+from labs.tasks.grid_world.walk import start_walk
+
+WORLD = GridWorld.parse("S.#\n.CG")
+
+
+class Drawn(NullScene):
+    """Keeps what is drawn."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.colors: dict[str, np.ndarray] = {}
+        self.points: dict[str, np.ndarray] = {}
+        self.labels: dict[str, str] = {}
+
+    def cells(
+        self,
+        name: str,
+        origin: ArrayLike,
+        size: float,
+        colors: np.ndarray,
+        *,
+        clickable: bool = True,
+    ) -> None:
+        super().cells(name, origin, size, colors, clickable=clickable)
+        self.colors[name] = colors
+        self.points[name] = np.asarray(origin)
+
+    def surface(self, name: str, points: np.ndarray, colors: np.ndarray) -> None:
+        super().surface(name, points, colors)
+        self.points[name], self.colors[name] = points, colors
+
+    def arrows(
+        self, name: str, starts: np.ndarray, ends: np.ndarray, color: Color = "force"
+    ) -> None:
+        super().arrows(name, starts, ends, color)
+        self.points[name] = np.stack([starts, ends])
+
+    def trail(
+        self, name: str, points: np.ndarray, color: Color = "actual", strength: float = 1.0
+    ) -> None:
+        super().trail(name, points, color, strength)
+        self.points[name] = points
+
+    def sphere(self, name: str, center: ArrayLike, radius: float, color: Color = "actual") -> None:
+        super().sphere(name, center, radius, color)
+        self.points[name] = np.asarray(center)
+
+    def label(self, name: str, text: str, position: ArrayLike) -> None:
+        super().label(name, text, position)
+        self.labels[name] = text
+
+
+def finite(scene: Drawn) -> bool:
+    return all(
+        np.isfinite(part).all() for parts in (scene.points, scene.colors) for part in parts.values()
+    )
+
+
+@pytest.mark.parametrize("relief", [False, True])
+def test_what_has_no_value_is_grey_and_what_is_no_state_has_a_colour_of_its_own(
+    relief: bool,
+) -> None:
+    scene = Drawn()
+    V = np.array([1.0, np.nan, np.inf, 0.0])
+    draw_board(scene, WORLD, V, 1.0, None, relief=relief)
+    colors = scene.colors["board"]
+    np.testing.assert_array_equal(colors[0, 1], NO_VALUE)
+    np.testing.assert_array_equal(colors[1, 0], NO_VALUE)
+    for cell, color in (((0, 2), WALL), ((1, 1), CLIFF), ((1, 2), GOAL)):
+        np.testing.assert_array_equal(colors[cell], color)
+    assert finite(scene)
+    assert ("relief" in scene.names) == relief
+    assert {"cell 0": "S", "cell 3": "G"}.items() <= scene.labels.items()
+
+
+def test_the_relief_is_as_tall_as_the_values() -> None:
+    scene = Drawn()
+    draw_board(scene, WORLD, np.array([2.0, 1.0, 0.0, 0.0]), 2.0, None, relief=True)
+    heights = scene.points["relief"][..., 2] - board(WORLD).relief[..., 2]
+    np.testing.assert_allclose(heights, [[HEIGHT, HEIGHT / 2, HEIGHT], [0.0, 0.0, 0.0]])
+
+
+def test_arrows_point_where_the_policy_leads_in_the_states_that_are_known() -> None:
+    scene, known = Drawn(), np.array([True, False, True, True])
+    draw_board(scene, WORLD, np.zeros(4), 1.0, np.array([1, 1, 0, 0]), known=known)
+    starts, ends = scene.points["policy"]
+    ways = (ends - starts) / board(WORLD).size
+    np.testing.assert_allclose(ways, [[0.56, 0.0, 0.0], [0.0, 0.56, 0.0]], atol=1e-12)
+    middles = board(WORLD).centers[[0, 1], [0, 0]]
+    np.testing.assert_allclose((0.5 * (starts + ends))[:, :2], middles[:, :2])
+
+
+def test_a_random_policy_has_an_arrow_for_each_control() -> None:
+    scene = Drawn()
+    draw_board(scene, WORLD, np.zeros(4), 1.0, np.tile([0.5, 0.5, 0.0, 0.0], (4, 1)))
+    assert scene.points["policy"].shape == (2, 6, 3)
+
+
+@pytest.mark.parametrize("text", [*MAPS.values(), "S" + 15 * "." + 15 * ("\n" + 16 * "G"), "SG"])
+def test_a_click_in_the_middle_of_a_cell_is_that_cell(text: str) -> None:
+    place = board(GridWorld.parse(text))
+    for cell in np.ndindex(place.rows, place.columns):
+        x, y, z = map(float, place.centers[cell])
+        assert place.cell_at((x, y, z)) == cell
+    assert place.cell_at((place.origin[0] - 0.01, place.origin[1], 0.0)) is None
+
+
+def test_the_wind_is_written_below_its_columns() -> None:
+    scene, windy = Drawn(), GridWorld.parse(MAPS["windy"])
+    draw_board(scene, windy, np.zeros(len(windy.cells)), 1.0, None)
+    assert [scene.labels.get(f"wind {c + 1}", "") for c in range(10)] == [
+        "↑" * wind for wind in windy.wind
+    ]
+
+
+def test_walkers_are_drawn_between_their_cells_and_ways_through_them() -> None:
+    scene, walk = Drawn(), start_walk(WORLD, 4, 2)
+    draw_walkers(scene, WORLD, walk)
+    assert {"walker 1", "walker 2"} <= set(scene.names)
+    far = start_walk(GridWorld.parse(MAPS["cliff"]), 4)
+    draw_walkers(scene, WORLD, far)
+    draw_way(scene, WORLD, np.array([[0, 0], [0, 1]]), 1)
+    draw_way(scene, WORLD, np.array([[0, 0]]), 0)
+    assert ("way 2" in scene.names, "way 1" in scene.names) == (True, False)
+    assert finite(scene)

@@ -9,7 +9,7 @@ import numpy as np
 from labs.lab import Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
 from labs.random_numbers import seeded
-from labs.reinforcement_learning.td_control.lab import greedy
+from labs.reinforcement_learning.td_control import greedy
 from labs.reinforcement_learning.td_control.params import BATCHES, LEARNING_METHODS, TdParams
 from labs.reinforcement_learning.td_control.plots import ORDER, PLOTS, learner_maps, learning_curves
 from labs.reinforcement_learning.td_control.tasks import LearningTask

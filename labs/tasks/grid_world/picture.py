@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from labs.colors import sequential
+from labs.colors import NO_VALUE, sequential
 from labs.scene import Color, Scene, cell_at, cell_centers
 from labs.tasks.grid_world.map import GridWorld
 from labs.tasks.grid_world.walk import GridWalk
@@ -18,8 +18,6 @@ from labs.tasks.grid_world.walk import GridWalk
 BOARD = "board"
 """The handle that a click on the board holds."""
 WALL, CLIFF, GOAL = (0.36, 0.38, 0.42), (0.55, 0.12, 0.12), (0.20, 0.66, 0.33)
-NO_VALUE = (0.62, 0.63, 0.65)
-"""Of cells without one."""
 WALKERS: tuple[Color, ...] = ("actual", "reference")
 """Of the first and the second of those side by side."""
 HEIGHT = 0.55

@@ -6,7 +6,7 @@ Dark is cheap and pale is dear, as in a heat map of the page; what has no value 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -59,6 +59,7 @@ class Board:
         return cell_at(point, self.origin, self.size, self.rows, self.columns)
 
 
+@lru_cache(maxsize=16)
 def board(world: GridWorld) -> Board:
     """Of a world's map."""
     return Board(*world.shape)

@@ -45,10 +45,11 @@ class TimeSeries:
 @dataclass(frozen=True)
 class Trace:
     """One line or set of points among `Curves`: y over x, 1-D fields of one length, which may
-    change and be 0. With y of shape (n, k) it is k curves over the same x, each of a colour of its
-    own. "marked" is a line with its points. Without a label it stays out of the legend; `note`
-    names a field of one number (or none) for each curve, that stands behind the label. `series` is
-    its colour, or that of the first curve, 1 to 8, or 0 for ink."""
+    change and be 0. With y of shape (n, k) it is k curves, each of a colour of its own, over the
+    same x or each over its column of an x of that shape. "marked" is a line with its points.
+    Without a label it stays out of the legend; `note` names a field of one number (or none) for
+    each curve, that stands behind the label. `series` is its colour, or that of the first curve,
+    1 to 8, or 0 for ink."""
 
     x: str
     y: str

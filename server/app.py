@@ -5,20 +5,17 @@ import contextlib
 import tempfile
 from collections.abc import AsyncIterator
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from fastapi import APIRouter, Body, FastAPI, Request, Response
-from fastapi.exceptions import RequestValidationError
-from fastapi.responses import FileResponse, JSONResponse
+from fastapi import APIRouter, Body, FastAPI, Request
+from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
-from starlette.exceptions import HTTPException
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from labs.engine.catalog import catalog, find
 from labs.engine.record import versions
-from labs.errors import LabError, UnknownLab
 from labs.params import Params
-from server import pages, proxy
+from server import pages, problems, proxy
 from server.guard import Guard
 from server.messages import (
     Apply,
@@ -30,38 +27,19 @@ from server.messages import (
     NewSession,
     ParamValues,
     Press,
-    Problem,
     SessionInfo,
 )
-from server.sessions import NoSession, NotNow, Session, Sessions, SessionsFull, Viewer
+from server.sessions import NoSession, Session, Sessions, Unavailable
 from server.settings import Settings
 from server.supervisor import Supervisor
+from server.viewers import Viewer
 
 SEND_SECONDS = 20.0
 """A viewer that takes this long for one message has left."""
 ENDED = 4404
 
 MEDIA = {"json": "application/json", "csv": "text/csv", "npz": "application/octet-stream"}
-STATUS_OF: dict[type[LabError], tuple[int, str]] = {
-    UnknownLab: (404, "unknown-lab"),
-    NoSession: (404, "no-session"),
-    SessionsFull: (503, "full"),
-    NotNow: (503, "not-now"),
-    LabError: (422, "invalid"),
-}
-PROBLEMS: dict[int | str, dict[str, Any]] = {
-    status: {"model": Problem, "description": text}
-    for status, text in (
-        (400, "The body is not JSON"),
-        (403, "Wrong Host or Origin"),
-        (404, "No such lab or session"),
-        (413, "The body is too large"),
-        (422, "Refused, and why"),
-        (503, "No place, or not now"),
-    )
-}
-
-api = APIRouter(prefix="/api", responses=PROBLEMS)
+api = APIRouter(prefix="/api", responses=problems.RESPONSES)
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -95,9 +73,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.include_router(health)
     app.include_router(proxy.router)
     pages.install(app)
-    app.add_exception_handler(LabError, _refused)
-    app.add_exception_handler(RequestValidationError, _not_valid)
-    app.add_exception_handler(HTTPException, _http_error)
+    problems.install(app)
     return app
 
 
@@ -142,7 +118,7 @@ async def create_session(request: Request, new: NewSession) -> SessionInfo:
     try:
         session = await _sessions(request).create(find(new.lab), new)
     except asyncio.CancelledError:
-        raise NotNow("the server stops: start it again, and open the lab anew") from None
+        raise Unavailable("the server stops: start it again, and open the lab anew") from None
     return session.info()
 
 
@@ -296,32 +272,3 @@ def _sessions(request: Request) -> Sessions:
 
 def _session(request: Request, session_id: str) -> Session:
     return _sessions(request).find(session_id)
-
-
-async def _refused(_: Request, error: Exception) -> Response:
-    for kind in type(error).__mro__:
-        if kind in STATUS_OF:
-            status, code = STATUS_OF[kind]
-            return _problem(status, str(error), code)
-    raise error
-
-
-async def _not_valid(_: Request, error: Exception) -> Response:
-    assert isinstance(error, RequestValidationError)
-    sentences = [
-        f"{'.'.join(str(part) for part in e['loc'][1:]) or 'body'}: {e['msg']}"
-        for e in error.errors()[:5]
-    ]
-    return _problem(422, "; ".join(sentences), "invalid")
-
-
-async def _http_error(request: Request, error: Exception) -> Response:
-    assert isinstance(error, HTTPException)
-    if error.status_code == 404 and "text/html" in request.headers.get("accept", ""):
-        return pages.missing(request, "There is nothing at this address")
-    sentence = f"{request.method} {request.url.path[:200]}: {error.detail}"
-    return _problem(error.status_code, sentence, "http", error.headers)
-
-
-def _problem(status: int, error: str, code: str, headers: Any = None) -> Response:
-    return JSONResponse({"error": error, "code": code}, status, headers)

@@ -38,7 +38,7 @@ class CellsNode(Node):
         clicked: Clicked | None,
         view: View,
     ) -> None:
-        self._shine = shine(view)
+        self._exposure = exposure(view)
         rows, columns, _ = colors.shape
         centers = cell_centers(origin, size, rows, columns).reshape(-1, 3)
         half = 0.5 * size * (1.0 - GAP)
@@ -49,7 +49,7 @@ class CellsNode(Node):
             np.array([[0, 1, 2], [0, 2, 3]], np.uint32),
             batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (rows * columns, 1)),
             batched_positions=centers,
-            batched_colors=_bytes(colors, self._shine),
+            batched_colors=_bytes(colors, self._exposure),
             lod="off",
             side="double",
             cast_shadow=False,
@@ -70,7 +70,7 @@ class CellsNode(Node):
         now = time.monotonic()
         if now - self._when > CELLS_EVERY:
             self._when = now
-            self.send("batched_colors", _bytes(colors, self._shine))
+            self.send("batched_colors", _bytes(colors, self._exposure))
 
 
 class SurfaceNode(Node):
@@ -86,15 +86,15 @@ class SurfaceNode(Node):
         view: View,
     ) -> None:
         super().__init__(server.scene.add_frame(f"/{name}", show_axes=False))
-        self._shine = shine(view)
-        data = glb(points, colors, self._shine)
+        self._exposure = exposure(view)
+        data = glb(points, colors, self._exposure)
         self._shown, self._hidden = (
             server.scene.add_glb(f"/{name}/{copy}", data, visible=copy == 0, cast_shadow=False)
             for copy in range(2)
         )
         # A speck that stays: while something wears a shader, the viewer need not compile it again.
         speck = np.broadcast_to(points.reshape(-1, 3).mean(axis=0), (2, 2, 3))
-        data = glb(speck, np.ones((2, 2, 3)), self._shine)
+        data = glb(speck, np.ones((2, 2, 3)), self._exposure)
         server.scene.add_glb(f"/{name}/speck", data, cast_shadow=False)
         self._last = np.stack([points, colors])
         self._when = time.monotonic()
@@ -109,13 +109,13 @@ class SurfaceNode(Node):
             self._preparing = False
         now = np.stack([points, colors])
         if since > SURFACE_EVERY and not np.array_equal(now, self._last):
-            self._hidden.glb_data = glb(points, colors, self._shine)
+            self._hidden.glb_data = glb(points, colors, self._exposure)
             self._last = now
             self._when = time.monotonic()
             self._preparing = True
 
 
-def shine(view: View) -> float:
+def exposure(view: View) -> float:
     """How much brighter the scene's light makes a colour (linear): a value's colour is made so
     much darker, to be about the one its legend shows."""
     if view.graphics == "low":
@@ -123,13 +123,13 @@ def shine(view: View) -> float:
     return 2.7 if view.dark else 3.6
 
 
-def glb(points: np.ndarray, colors: np.ndarray, shine: float) -> bytes:
+def glb(points: np.ndarray, colors: np.ndarray, exposure: float) -> bytes:
     """A surface through `points` (rows, columns, 3) with a colour (rows, columns, 3) a point, in
     binary glTF 2.0. The viewer computes the normals."""
     corners = points.reshape(-1, 3).astype("<f4")
     faces = _faces(*points.shape[:2])
     tints = np.full((len(corners), 4), 65535, "<u2")
-    tints[:, :3] = np.round(65535 / shine * _linear(colors.reshape(-1, 3)))
+    tints[:, :3] = np.round(65535 / exposure * _linear(colors.reshape(-1, 3)))
     parts = [corners.tobytes(), tints.tobytes(), faces.tobytes()]
     starts = np.cumsum([0, *map(len, parts)]).tolist()
     float32, uint16, uint32 = 5126, 5123, 5125
@@ -195,9 +195,9 @@ def _chunk(kind: bytes, data: bytes, filler: bytes) -> bytes:
     return np.array([len(data)], "<u4").tobytes() + kind + data
 
 
-def _bytes(colors: np.ndarray, shine: float) -> np.ndarray:
+def _bytes(colors: np.ndarray, exposure: float) -> np.ndarray:
     """Per-instance colours as Viser takes them: linear, not sRGB."""
-    return np.round(255 / shine * _linear(colors.reshape(-1, 3))).astype(np.uint8)
+    return np.round(255 / exposure * _linear(colors.reshape(-1, 3))).astype(np.uint8)
 
 
 def _linear(srgb: np.ndarray) -> np.ndarray:

@@ -176,7 +176,7 @@ def _run(options: argparse.Namespace) -> int:
         outputs.append(
             ("--solution-out", options.solution_out, lambda w, form: w.solution().write(form))
         )
-    plan = _replayed(options) if options.replay else _planned(options)
+    plan = _arguments_of_recording(options) if options.replay else _arguments_of_options(options)
     if options.seconds is not None:
         plan["seconds"] = options.seconds
     world = run(**plan, progress=_progress if sys.stderr.isatty() else None)
@@ -205,11 +205,11 @@ def _check_output(option: str, path: Path, forms: Sequence[str]) -> None:
         raise LabError(f"{option} {path}: there is no folder {path.parent}")
 
 
-def _planned(options: argparse.Namespace) -> dict[str, Any]:
+def _arguments_of_options(options: argparse.Namespace) -> dict[str, Any]:
     if options.lab is None:
         raise LabError(f"say which lab to run: {', '.join(catalog())}")
     entry = find(options.lab)
-    texts = dict(_pair(text) for text in options.set)
+    texts = dict(_parse_assignment(text) for text in options.set)
     return {
         "slug": options.lab,
         "changes": entry.lab.Params.read(texts),
@@ -228,7 +228,7 @@ def _solution(path: Path) -> Solution:
         raise LabError(f"--solution {path}: {error}") from None
 
 
-def _replayed(options: argparse.Namespace) -> dict[str, Any]:
+def _arguments_of_recording(options: argparse.Namespace) -> dict[str, Any]:
     path = options.replay
     if options.lab or options.set or options.at or options.seed is not None or options.solution:
         raise LabError("--replay takes the lab, its parameters, changes and seed from the file")
@@ -261,7 +261,7 @@ def _seed(seed: int | None) -> int | None:
     return seed
 
 
-def _pair(text: str) -> tuple[str, str]:
+def _parse_assignment(text: str) -> tuple[str, str]:
     name, equals, value = text.partition("=")
     if not equals:
         raise LabError(f"--set {text}: write name=value")

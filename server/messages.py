@@ -3,12 +3,17 @@
 The API validates what comes in; numbers are finite, sizes bounded. Page and worker messages are
 JSON objects with a `type`."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-Value = float | bool | str
+from labs.params import Value
+
 Changes = Annotated[dict[Annotated[str, Field(max_length=64)], Value], Field(max_length=100)]
+LinkTexts = Annotated[dict[Annotated[str, Field(max_length=64)], str], Field(max_length=100)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
@@ -29,6 +34,8 @@ class View(Message):
 class NewSession(Message):
     lab: Annotated[str, Field(max_length=64)]
     params: Changes = {}
+    link: LinkTexts = {}
+    """Further parameters, as texts: what a page's address says."""
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
     view: View = View()
 
@@ -197,17 +204,21 @@ class Hello(Message):
     period: float
 
 
-class Telemetry(Message):
-    """New samples, 30 times a second at most. A missing scalar is null."""
+@dataclass(frozen=True)
+class Telemetry:
+    """New samples, 30 times a second at most. On the wire arrays are lists and NaN, such as a
+    missing scalar, is null (server/pipe.py)."""
 
-    type: Literal["telemetry"] = "telemetry"
     run: int
     """Counts restarts: rows of another run are another curve."""
-    rows: list[list[float | None]]
-    now: list[float | None] | None = None
-    """The state as it is, where it changed since the last sample without time going on."""
-    fields: dict[str, Any] | None = None
-    """Arrays for curves, heat maps, matrices and bars, a few times a second."""
+    rows: np.ndarray
+    """(k, columns)."""
+    now: np.ndarray | None = None
+    """(columns,): the state as it is, where it changed since the last sample without time going
+    on."""
+    fields: Mapping[str, np.ndarray | str] | None = None
+    """Arrays for curves, heat maps, matrices and bars, and notes, a few times a second."""
+    type: Literal["telemetry"] = "telemetry"
 
 
 class SolverStatus(Message):

@@ -28,7 +28,7 @@ STILL = 2e-5
 """A pose entry that moved less [m, or of a unit quaternion] is not sent again."""
 
 
-def paler(color: Color, strength: float, dark: bool) -> np.ndarray:
+def blend_with_background(color: Color, strength: float, dark: bool) -> np.ndarray:
     """(3,) a colour mixed towards what is behind it: lines cannot be translucent."""
     behind = np.array(DARK if dark else LIGHT)
     mixed: np.ndarray = behind + strength * (np.array(COLORS[color]) - behind)
@@ -39,7 +39,7 @@ class Node:
     """A Viser node that is sent only what changed."""
 
     def __init__(self, handle: Any) -> None:
-        self.look: object = None
+        self.appearance: object = None
         self._handle = handle
         self._visible = True
         self._position = np.full(3, np.nan)

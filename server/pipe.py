@@ -23,10 +23,10 @@ def frame(kind: int, payload: bytes) -> bytes:
 
 def encode(message: Any) -> bytes:
     """JSON; arrays become lists, NaN becomes null."""
-    return orjson.dumps(message, default=_strided, option=orjson.OPT_SERIALIZE_NUMPY)
+    return orjson.dumps(message, default=_array_to_list, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
-def _strided(value: object) -> object:
+def _array_to_list(value: object) -> object:
     """Arrays that are views with strides come here; nothing else that is no JSON may pass."""
     if isinstance(value, np.ndarray):
         return value.tolist()

@@ -13,7 +13,7 @@ PATIENCE = 2.0
 """[s] Compiling that takes longer is told on the terminal."""
 
 
-def _wait(parent: int, over: threading.Event) -> None:
+def _announce_compilation(parent: int, over: threading.Event) -> None:
     """Says why it takes long, and ends with the server: who compiles hears of nothing else."""
     if not over.wait(PATIENCE):
         print("First start: compiling the solvers, once; this may take a minute ...", flush=True)
@@ -25,7 +25,7 @@ def _wait(parent: int, over: threading.Event) -> None:
 def _prepare() -> None:
     """Compiled code is kept on disk: a second start finds it."""
     over = threading.Event()
-    waiting = threading.Thread(target=_wait, args=(os.getppid(), over))
+    waiting = threading.Thread(target=_announce_compilation, args=(os.getppid(), over))
     waiting.start()
     try:
         for entry in catalog().values():

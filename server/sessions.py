@@ -4,7 +4,6 @@ import asyncio
 import contextlib
 import secrets
 from collections import deque
-from collections.abc import AsyncIterator
 from typing import Any
 
 import orjson
@@ -17,9 +16,8 @@ from server.pipe import HELLO, STATUS
 from server.settings import Settings
 from server.supervisor import Supervisor, Worker, WorkerGone
 from server.tasks import Tasks
+from server.viewers import Viewer
 
-QUEUE = 64
-"""Messages a slow viewer may be behind: two seconds. Then it starts afresh."""
 CRASHES, CRASH_SECONDS = 3, 60.0
 
 
@@ -31,35 +29,8 @@ class NoSession(LabError):
     """No session has this id (any more)."""
 
 
-class NotNow(LabError):
+class Unavailable(LabError):
     """The session's worker is being replaced."""
-
-
-class Viewer:
-    """One page that watches. Too slow, it loses old telemetry; nobody waits for it."""
-
-    def __init__(self) -> None:
-        self._queue: asyncio.Queue[bytes | None] = asyncio.Queue(QUEUE + 4)
-
-    def push(self, payload: bytes, afresh: list[bytes]) -> None:
-        """Queues a message. A viewer too far behind skips to `afresh` and this one."""
-        if self._queue.qsize() >= QUEUE:
-            while not self._queue.empty():
-                self._queue.get_nowait()
-            for message in afresh:
-                self._queue.put_nowait(message)
-        self._queue.put_nowait(payload)
-
-    def close(self) -> None:
-        """Ends the stream after what is queued."""
-        if self._queue.full():
-            self._queue.get_nowait()
-        self._queue.put_nowait(None)
-
-    async def messages(self) -> AsyncIterator[bytes]:
-        """What to send, until the session ends."""
-        while (payload := await self._queue.get()) is not None:
-            yield payload
 
 
 class Session:
@@ -80,7 +51,7 @@ class Session:
             "speed": 1.0,
             "solver": None,
         }
-        self._kept: dict[int, bytes] = {}
+        self._latest_frames: dict[int, bytes] = {}
         self._crashes: deque[float] = deque(maxlen=CRASHES)
         now = asyncio.get_running_loop().time()
         self.watched = self.touched = now
@@ -105,53 +76,53 @@ class Session:
         worker.on_frame = self._on_frame
         self.worker = worker
         self.state = "live"
-        worker.tell("open", lab=self.entry.slug, **self._latest)
-        worker.tell("viewers", count=len(self.viewers))
+        worker.send("open", lab=self.entry.slug, **self._latest)
+        worker.send("viewers", count=len(self.viewers))
 
     async def change(self, changes: dict[str, Any]) -> dict[str, Any]:
-        """New parameters; answers all of them. Raises ParameterError, NotNow."""
+        """New parameters; answers all of them. Raises ParameterError, Unavailable."""
         self.entry.lab.Params().change(changes)
         params: dict[str, Any] = await self.ask("params", changes=changes)
         self._latest["params"] = params
         return params
 
     async def ask(self, do: str, **arguments: Any) -> Any:
-        """What the worker answers. Raises LabError, NotNow."""
+        """What the worker answers. Raises LabError, Unavailable."""
         self.touched = asyncio.get_running_loop().time()
         try:
-            return await self._present().ask(do, **arguments)
+            return await self._live_worker().ask(do, **arguments)
         except WorkerGone:
-            raise self._not_now() from None
+            raise self._unavailable() from None
 
     async def load(self, path: str) -> dict[str, Any]:
-        """Takes up a solution from a file; answers all parameters. Raises LabError, NotNow."""
+        """Takes up a solution from a file; answers all parameters. Raises LabError, Unavailable."""
         params: dict[str, Any] = await self.ask("load", path=path)
         self._latest["params"] = params
         return params
 
     async def write(self, what: str, form: str, path: str) -> None:
-        """Writes the recording ("export") or the solution to a file. Raises LabError, NotNow."""
+        """Writes the recording ("export") or the solution to a file. Raises as `ask`."""
         try:
-            await self._present().ask_for_file(what, form, path)
+            await self._live_worker().ask_for_file(what, form, path)
         except WorkerGone:
-            raise self._not_now() from None
+            raise self._unavailable() from None
 
-    def _present(self) -> Worker:
+    def _live_worker(self) -> Worker:
         if self.worker is None or self.worker.gone:
-            raise self._not_now()
+            raise self._unavailable()
         return self.worker
 
-    def _not_now(self) -> NotNow:
+    def _unavailable(self) -> Unavailable:
         if self.state == "failed":
-            return NotNow("this session has ended after repeated crashes: open the lab anew")
-        return NotNow("the simulation is being restarted: try again in a moment")
+            return Unavailable("this session has ended after repeated crashes: open the lab anew")
+        return Unavailable("the simulation is being restarted: try again in a moment")
 
     # Viewers ------------------------------------------------------------------------------------
 
     def join(self) -> Viewer:
         """A page begins to watch."""
         viewer = Viewer()
-        for payload in self._kept.values():
+        for payload in self._latest_frames.values():
             viewer.push(payload, [])
         self.viewers.add(viewer)
         self._count()
@@ -171,16 +142,16 @@ class Session:
     def _count(self) -> None:
         with contextlib.suppress(WorkerGone):
             if self.worker:
-                self.worker.tell("viewers", count=len(self.viewers))
+                self.worker.send("viewers", count=len(self.viewers))
 
     def _broadcast(self, payload: bytes) -> None:
-        afresh = list(self._kept.values())
+        latest = list(self._latest_frames.values())
         for viewer in self.viewers:
-            viewer.push(payload, afresh)
+            viewer.push(payload, latest)
 
     def _on_frame(self, kind: int, payload: bytes) -> None:
         if kind in (HELLO, STATUS):
-            self._kept[kind] = payload
+            self._latest_frames[kind] = payload
         if kind == STATUS:
             status = orjson.loads(payload)
             for name in self._latest:
@@ -208,16 +179,17 @@ class Sessions:
         return len(self._sessions)
 
     def start(self) -> None:
-        self._tasks.do(self._reap())
+        self._tasks.spawn(self._reap())
 
     async def stop(self) -> None:
         self._tasks.cancel()
         for session in tuple(self._sessions.values()):
-            self._forget(session, "ended", "The server stops.")
+            self._close(session, "ended", "The server stops.")
 
     async def create(self, entry: Entry, new: NewSession) -> Session:
         """A new session. Raises SessionsFull, ParameterError."""
-        params = entry.lab.Params().change(new.params)
+        Params = entry.lab.Params
+        params = Params().change(Params.read(new.link) | new.params)
         if len(self) >= self._settings.max_sessions:
             raise SessionsFull(
                 f"all {self._settings.max_sessions} places are taken: close another lab's page, "
@@ -228,11 +200,11 @@ class Sessions:
         try:
             await session.open(self._supervisor)
         except WorkerGone as error:
-            self._forget(session, "failed", str(error))
-            raise NotNow(f"the lab could not be opened ({error}): try again") from None
+            self._close(session, "failed", str(error))
+            raise Unavailable(f"the lab could not be opened ({error}): try again") from None
         if session.id not in self._sessions:
-            self._forget(session, "ended", "")
-            raise NotNow("the session was closed before it opened: open the lab anew")
+            self._close(session, "ended", "")
+            raise Unavailable("the session was closed before it opened: open the lab anew")
         self._watch(session)
         return session
 
@@ -247,12 +219,12 @@ class Sessions:
 
     async def delete(self, session_id: str) -> None:
         """Ends a session. Raises NoSession."""
-        self._forget(self.find(session_id), "ended", "This session was closed.")
+        self._close(self.find(session_id), "ended", "This session was closed.")
 
     def _watch(self, session: Session) -> None:
         worker = session.worker
         assert worker is not None
-        worker.on_gone = lambda reason: self._tasks.do(self._recover(session, reason))
+        worker.on_gone = lambda reason: self._tasks.spawn(self._recover(session, reason))
         if worker.gone:
             worker.on_gone(worker.gone)
 
@@ -279,12 +251,12 @@ class Sessions:
             await self._recover(session, str(error))
             return
         if session.id not in self._sessions:
-            self._forget(session, "ended", "")
+            self._close(session, "ended", "")
             return
         session.notify("live", f"The simulation was restarted with your parameters: {reason}.")
         self._watch(session)
 
-    def _forget(self, session: Session, state: str, text: str) -> None:
+    def _close(self, session: Session, state: str, text: str) -> None:
         self._sessions.pop(session.id, None)
         session.notify(state, text)
         for viewer in session.viewers:
@@ -292,7 +264,7 @@ class Sessions:
         worker, session.worker = session.worker, None
         if worker:
             worker.on_gone = lambda reason: None
-            self._tasks.do(self._supervisor.release(worker, "its session ended"))
+            self._tasks.spawn(self._supervisor.release(worker, "its session ended"))
 
     async def _reap(self) -> None:
         settings = self._settings
@@ -303,10 +275,10 @@ class Sessions:
                 if session.state == "starting":
                     session.watched = now  # its first worker may take a minute
                 elif not session.viewers and now - session.watched > settings.viewerless_seconds:
-                    self._forget(session, "ended", "Nobody was watching.")
+                    self._close(session, "ended", "Nobody was watching.")
                 elif now - session.touched > settings.untouched_seconds:
                     minutes = settings.untouched_seconds / 60
-                    self._forget(
+                    self._close(
                         session,
                         "ended",
                         f"Nobody touched this lab for {minutes:.0f} minutes, so it made room for "

@@ -8,7 +8,7 @@ from labs.engine.run import World
 from labs.errors import LabError
 from server.messages import SolverStatus
 
-MOST_OWED = 1000
+MAX_PENDING = 1000
 SLIP = 0.2
 """[s] It may lag behind its pace and still catch up; what is beyond is given up."""
 ESTIMATE_AFTER = 0.5
@@ -18,28 +18,28 @@ ESTIMATE_AFTER = 0.5
 class SolverClock:
     """Runs, holds and steps a world's solver, and looks back at what it found."""
 
-    def __init__(self, world: World, told: Mapping[str, Any] | None) -> None:
-        """`told`: the last status of the session's solver, if it had one."""
+    def __init__(self, world: World, status: Mapping[str, Any] | None) -> None:
+        """`status`: the last one of the session's solver, if it had one."""
         self._world = world
-        self.running: bool = told["running"] if told else True
-        self.pace: float = told["pace"] if told else 0.0
-        self._owed = 0
+        self.running: bool = status["running"] if status else True
+        self.pace: float = status["pace"] if status else 0.0
+        self._pending = 0
         """Iterations to do although paused."""
-        self._midway = False
+        self._mid_iteration = False
         """Whether an iteration has begun and not ended."""
         self._next = 0.0
         """When the next one is due [s, wall clock]."""
         self._begin(0.0)
 
-    def _follow(self, now: float) -> None:
+    def _sync(self, now: float) -> None:
         if self._world.solves != self._solves:
             self._begin(now)
 
     def _begin(self, now: float) -> None:
         """The solver was started anew."""
         self._solves = self._world.solves
-        self._owed = 0
-        self._midway = False
+        self._pending = 0
+        self._mid_iteration = False
         self._next = 0.0
         self._active = False
         self._last = now
@@ -47,26 +47,26 @@ class SolverClock:
         """[s] of the wall clock, since it was started and while it ran."""
         self._before = self._progress()
 
-    def obey(self, do: str, **arguments: Any) -> None:
+    def dispatch(self, do: str, **arguments: Any) -> None:
         """Runs, pauses, steps, shows or sets the pace. Raises LabError."""
         if not self._world.lab.has_solver():
             raise LabError("this lab has no solver")
-        self._follow(time.perf_counter())
+        self._sync(time.perf_counter())
         getattr(self, f"_do_{do}")(**arguments)
 
     def _do_run(self) -> None:
         """Goes on from the latest iteration, wherever one looked back to."""
-        self.running, self._owed = True, 0
+        self.running, self._pending = True, 0
         if self._world.latest and not self._world.solving:
             self._world.show(self._world.latest.iteration)
 
     def _do_pause(self) -> None:
         self.running = self._active = False
-        self._owed = 0
+        self._pending = 0
 
     def _do_step(self, count: int) -> None:
         self.running = False
-        self._owed = min(self._owed + count, MOST_OWED)
+        self._pending = min(self._pending + count, MAX_PENDING)
 
     def _do_show(self, iteration: int) -> None:
         self._do_pause()
@@ -78,15 +78,15 @@ class SolverClock:
     def iterate(self, now: float, until: float) -> None:
         """What is due: one piece of an iteration at least, and none begins after `until`."""
         world = self._world
-        self._follow(now)
+        self._sync(now)
         if self._active:
             self._spent += now - self._last
         self._last = now
-        self._active = world.solving and (self.running or self._owed > 0)
-        while world.solving and (self._owed or self._is_due(now)):
-            self._midway = not world.work()
-            if self._owed and not self._midway:
-                self._owed -= 1
+        self._active = world.solving and (self.running or self._pending > 0)
+        while world.solving and (self._pending or self._is_due(now)):
+            self._mid_iteration = not world.work()
+            if self._pending and not self._mid_iteration:
+                self._pending -= 1
             if time.perf_counter() > until:
                 break
 
@@ -108,7 +108,7 @@ class SolverClock:
         )
 
     def _is_due(self, now: float) -> bool:
-        if not self.running or self._midway:
+        if not self.running or self._mid_iteration:
             return self.running
         if self.pace:
             if now < self._next:

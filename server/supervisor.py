@@ -46,15 +46,15 @@ class Worker:
         self._ready = asyncio.get_running_loop().create_future()
         self._heard = asyncio.get_running_loop().time()
 
-    async def begin(self) -> None:
+    async def wait_until_ready(self) -> None:
         """Waits until the worker has said that it is ready."""
         self._reader, self._writer = await asyncio.open_connection(sock=self._socket)
         self._listening = asyncio.create_task(self._listen())
         self.port = await asyncio.wait_for(self._ready, SPAWN_SECONDS)
 
-    def tell(self, do: str, **arguments: Any) -> None:
+    def send(self, do: str, **arguments: Any) -> None:
         """Says what to do; expects no answer."""
-        self._send({"do": do, "with": arguments})
+        self._write({"do": do, "with": arguments})
 
     async def ask(self, do: str, **arguments: Any) -> Any:
         """What the worker answers. Raises LabError if it refuses, WorkerGone if it is gone or
@@ -85,7 +85,7 @@ class Worker:
         await asyncio.to_thread(self.process.join, 5)
 
     async def _answer(self, do: str, reference: int, arguments: dict[str, Any]) -> Any:
-        self._send({"do": do, "ref": reference, "with": arguments})
+        self._write({"do": do, "ref": reference, "with": arguments})
         return await self._await(reference)
 
     def _expect(self) -> int:
@@ -101,7 +101,7 @@ class Worker:
         finally:
             self._answers.pop(reference, None)
 
-    def _send(self, message: dict[str, Any]) -> None:
+    def _write(self, message: dict[str, Any]) -> None:
         if self.gone:
             raise WorkerGone(self.gone)
         self._writer.write(frame(CONTROL, encode(message)))
@@ -118,7 +118,7 @@ class Worker:
                     self.on_frame(kind, payload)
         except (asyncio.IncompleteReadError, OSError):
             await asyncio.to_thread(self.process.join, 1)
-            self._finish(_obituary(self.process.exitcode))
+            self._finish(_describe_exit(self.process.exitcode))
 
     def _control(self, message: dict[str, Any]) -> None:
         if message.get("ready"):
@@ -171,8 +171,8 @@ class Supervisor:
 
     def start(self) -> None:
         """Begins to watch, and warms the first spare."""
-        self._tasks.do(self._watch())
-        self._tasks.do(self._fill())
+        self._tasks.spawn(self._watch())
+        self._tasks.spawn(self._fill())
 
     async def stop(self) -> None:
         """Ends every worker."""
@@ -185,7 +185,7 @@ class Supervisor:
         if spare:
             self._spares.remove(spare)
         worker = spare or await self._spawn()
-        self._tasks.do(self._fill())
+        self._tasks.spawn(self._fill())
         return worker
 
     async def release(self, worker: Worker, reason: str) -> None:
@@ -210,7 +210,7 @@ class Supervisor:
         worker = Worker(process, ours)
         self._workers.add(worker)
         try:
-            await worker.begin()
+            await worker.wait_until_ready()
         except (WorkerGone, TimeoutError) as error:
             await self.release(worker, "it did not start")
             raise WorkerGone(f"a worker did not start: {error}") from None
@@ -230,11 +230,11 @@ class Supervisor:
                 if worker.gone:
                     self._workers.discard(worker)
                     if worker in self._spares:
-                        self._tasks.do(self._fill())
+                        self._tasks.spawn(self._fill())
                 elif worker.port and worker.silence > self._settings.hang_seconds:
                     seconds = self._settings.hang_seconds
                     reason = f"it stopped answering for {seconds:g} s and was ended"
-                    self._tasks.do(self.release(worker, reason))
+                    self._tasks.spawn(self.release(worker, reason))
 
 
 async def _on_a_thread(work: Callable[[], None]) -> None:
@@ -242,7 +242,7 @@ async def _on_a_thread(work: Callable[[], None]) -> None:
     loop = asyncio.get_running_loop()
     done: asyncio.Future[None] = loop.create_future()
 
-    def tell(error: BaseException | None) -> None:
+    def finish(error: BaseException | None) -> None:
         if done.done():
             return
         if error:
@@ -257,13 +257,13 @@ async def _on_a_thread(work: Callable[[], None]) -> None:
         except BaseException as problem:
             error = problem
         with contextlib.suppress(RuntimeError):  # the loop has ended: nobody waits any more
-            loop.call_soon_threadsafe(tell, error)
+            loop.call_soon_threadsafe(finish, error)
 
     threading.Thread(target=run, daemon=True).start()
     await done
 
 
-def _obituary(exitcode: int | None) -> str:
+def _describe_exit(exitcode: int | None) -> str:
     if exitcode is not None and exitcode < 0:
         return f"it was ended by {signal.Signals(-exitcode).name}"
     return f"it ended unexpectedly (exit code {exitcode})"

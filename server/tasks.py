@@ -14,7 +14,7 @@ class Tasks:
     def __init__(self) -> None:
         self._running: set[asyncio.Task[Any]] = set()
 
-    def do(self, work: Coroutine[Any, Any, Any]) -> None:
+    def spawn(self, work: Coroutine[Any, Any, Any]) -> None:
         """Begins `work`; nobody waits for it."""
         task = asyncio.create_task(work)
         self._running.add(task)

@@ -20,7 +20,8 @@ from server import meshes
 from server.boards import CellsNode, SurfaceNode
 from server.mailbox import Mailbox
 from server.messages import View
-from server.nodes import COLORS, ArmNode, Node, paler
+from server.nodes import COLORS, ArmNode, Node, blend_with_background
+from server.surroundings import show_surroundings
 
 TRAIL_EVERY = 3
 """Frames between two updates of a trail or of many arrows: they are long messages."""
@@ -42,31 +43,7 @@ class ViserScene:
         """Light or dark; low graphics means no environment light, no shadows, plain meshes."""
         self._view = view
         self._clear()
-        self._server.gui.configure_theme(
-            dark_mode=view.dark,
-            show_logo=False,
-            show_share_button=False,
-            control_width="small",
-            brand_color=COLORS["actual"],
-        )
-        scene = self._server.scene
-        high = view.graphics == "high"
-        scene.configure_default_lights(enabled=True, cast_shadow=high)
-        scene.configure_environment_map(
-            "studio" if high else None, environment_intensity=0.25 if view.dark else 0.45
-        )
-        # Without an environment map nothing lights what faces away from the lamps.
-        scene.add_light_ambient("/ambient", intensity=0.0 if high else 1.2)
-        scene.add_grid(
-            "/floor",
-            infinite_grid=True,
-            cell_size=0.1,
-            section_size=0.5,
-            cell_color=(52, 58, 70) if view.dark else (226, 230, 236),
-            section_color=(74, 84, 100) if view.dark else (196, 204, 214),
-            fade_distance=9.0,
-            shadow_opacity=0.25 if high else 0.0,
-        )
+        show_surroundings(self._server, view)
 
     def draw(self, world: World) -> None:
         """One frame of a lab, to whoever looks."""
@@ -100,8 +77,10 @@ class ViserScene:
         ghost: bool = False,
         effort: np.ndarray | None = None,
     ) -> None:
-        look = (id(arm), ghost)
-        node = self._node(name, look, lambda: ArmNode(self._server, name, arm, ghost, self._view))
+        appearance = (id(arm), ghost)
+        node = self._node(
+            name, appearance, lambda: ArmNode(self._server, name, arm, ghost, self._view)
+        )
         assert isinstance(node, ArmNode)
         node.move(q)
         if effort is not None:
@@ -113,7 +92,7 @@ class ViserScene:
         if len(points) < 2:
             return
         segments = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
-        mixed = paler(color, strength, self._view.dark)
+        mixed = blend_with_background(color, strength, self._view.dark)
 
         def make() -> Node:
             return Node(
@@ -288,14 +267,14 @@ class ViserScene:
 
     # Nodes ----------------------------------------------------------------------------------
 
-    def _node(self, name: str, look: object, make: Callable[[], Node]) -> Node:
+    def _node(self, name: str, appearance: object, make: Callable[[], Node]) -> Node:
         """The node of this name, made anew where it must look different."""
         node = self._nodes.get(name)
-        if node is None or node.look != look:
+        if node is None or node.appearance != appearance:
             if node is not None:
                 node.remove()
             node = self._nodes[name] = make()
-            node.look = look
+            node.appearance = appearance
         self._drawn.add(name)
         return node
 

@@ -24,20 +24,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from labs.algorithms.adjoint import AT_BOUND, gradient_norm
 from labs.algorithms.ddp_sweep import backward_pass
 from labs.algorithms.regularisation import Regularisation, regularisation
 from labs.errors import LabError
 from labs.problems.optimal_control import (
-    Model,
-    Pieces,
-    Problem,
+    Expansion,
+    OptimalControlProblem,
     diverges_at,
     expand,
-    gradient_norm,
     rollout,
-    timed,
-    whole,
 )
+from labs.resumable import Resumable, run_to_completion, timed
 
 HALVINGS = 12
 """Of alpha, at most."""
@@ -106,11 +104,11 @@ class Iterate:
     converged: bool = False
     seconds: Mapping[str, float] = field(default_factory=dict)
     """Of the wall clock, spent by the last iteration in derivatives, backward and forward."""
-    model: Model | None = None
+    model: Expansion | None = None
     """About (X, U), where it is known already."""
 
 
-def init(problem: Problem, U: np.ndarray, options: Options) -> Iterate:
+def init(problem: OptimalControlProblem, U: np.ndarray, options: Options) -> Iterate:
     """The first guess U (N, nu), rolled out. Raises LabError if its shape does not fit."""
     N, nu, nx = problem.N, problem.dynamics.nu, problem.dynamics.nx
     if U.shape != (N, nu):
@@ -118,23 +116,18 @@ def init(problem: Problem, U: np.ndarray, options: Options) -> Iterate:
     guess, gains = np.array(U, dtype=float), np.zeros((N, nu, nx))
     X, U, cost = rollout(problem, np.zeros((N + 1, nx)), guess, gains)
     diverged = f"The first guess diverges at step {diverges_at(X)} of {N}; start from another."
-    return Iterate(
-        X=X,
-        U=U,
-        cost=cost,
-        w=np.zeros((N, nu)),
-        K=gains,
-        mu=options.mu,
-        stopped="" if np.isfinite(cost) else diverged,
-    )
+    stopped = "" if np.isfinite(cost) else diverged
+    return Iterate(X, U, cost, np.zeros((N, nu)), gains, options.mu, stopped=stopped)
 
 
-def step(problem: Problem, options: Options, at: Iterate) -> Iterate:
+def step(problem: OptimalControlProblem, options: Options, at: Iterate) -> Iterate:
     """One iteration: expansion, backward pass, line search. What has stopped stays as it is."""
-    return whole(step_in_pieces(problem, options, at))
+    return run_to_completion(step_in_pieces(problem, options, at))
 
 
-def step_in_pieces(problem: Problem, options: Options, at: Iterate) -> Pieces[Iterate]:
+def step_in_pieces(
+    problem: OptimalControlProblem, options: Options, at: Iterate
+) -> Resumable[Iterate]:
     """The same, pausing between pieces of some milliseconds."""
     if at.stopped:
         return at
@@ -162,16 +155,16 @@ def step_in_pieces(problem: Problem, options: Options, at: Iterate) -> Pieces[It
     if found.failed:
         at = replace(at, stopped=found.failed)
     elif at.mu == 0.0 and -at.expected <= options.tolerance * abs(at.cost):
-        at = replace(at, converged=True, stopped=_farewell(at))
+        at = replace(at, converged=True, stopped=_convergence_message(at))
     else:
         search = _search(problem, options, allowed, at, found.d_1, found.d_2)
         at = yield from timed(search, seconds, "forward")
         if not at.stopped and at.iteration >= options.iterations:
-            at = replace(at, stopped=_unfinished(at))
+            at = replace(at, stopped=_iteration_limit_message(at))
     return replace(at, seconds=seconds)
 
 
-def solve(problem: Problem, U: np.ndarray, options: Options | None = None) -> Iterate:
+def solve(problem: OptimalControlProblem, U: np.ndarray, options: Options | None = None) -> Iterate:
     """Iterates from the first guess U (N, nu) until it stops."""
     options = options or Options()
     at = init(problem, U, options)
@@ -192,12 +185,18 @@ class Direction(NamedTuple):
 
 
 def _direction(
-    problem: Problem, options: Options, allowed: Regularisation, model: Model, at: Iterate
+    problem: OptimalControlProblem,
+    options: Options,
+    allowed: Regularisation,
+    model: Expansion,
+    at: Iterate,
 ) -> Direction:
     w, K = np.empty_like(at.w), np.empty_like(at.K)
     low = high = np.empty((0, 0))
     if problem.bound is not None:
         low, high = -problem.bound - at.U, problem.bound - at.U
+        low[-low <= AT_BOUND * problem.bound] = 0.0
+        high[high <= AT_BOUND * problem.bound] = 0.0
 
     def sweep(mu: float) -> tuple[int, float, float]:
         return backward_pass(model.A, model.B, model.second, *model.cost, mu, low, high, w, K)
@@ -238,8 +237,13 @@ def _direction(
 
 
 def _search(
-    problem: Problem, options: Options, allowed: Regularisation, at: Iterate, d_1: float, d_2: float
-) -> Pieces[Iterate]:
+    problem: OptimalControlProblem,
+    options: Options,
+    allowed: Regularisation,
+    at: Iterate,
+    d_1: float,
+    d_2: float,
+) -> Resumable[Iterate]:
     """The line search, and mu for the next iteration."""
     more = allowed.grown(at.mu)
     diverged = 0
@@ -278,14 +282,14 @@ def _search(
     )
 
 
-def _unfinished(at: Iterate) -> str:
+def _iteration_limit_message(at: Iterate) -> str:
     return (
         f"Stopped short after {at.iteration} iterations: the last one changed the cost by "
         f"{at.actual:.1e}. Solve again from here to go on."
     )
 
 
-def _farewell(at: Iterate) -> str:
+def _convergence_message(at: Iterate) -> str:
     return (
         f"Converged after {at.iteration} iteration{'s'[: at.iteration != 1]}: a further step "
         f"would lower the cost by {abs(at.expected):.1e} of {at.cost:.4g}."

@@ -104,23 +104,6 @@ def backward_pass(
 
 
 @compiled
-def costate(A: np.ndarray, B: np.ndarray, l_x: np.ndarray, l_u: np.ndarray) -> np.ndarray:
-    """dJ/dU (N, m), the gradient of the cost of a rollout with respect to its controls: with
-    p_N = l_x(N) and p_t = l_x + A' p_(t+1), it is l_u + B' p_(t+1)."""
-    N, n, m = B.shape
-    p, earlier, gradient = l_x[N].copy(), np.empty(n), l_u.copy()
-    for t in range(N - 1, -1, -1):
-        earlier[:] = l_x[t]
-        for i in range(n):
-            for j in range(m):
-                gradient[t, j] += B[t, i, j] * p[i]
-            for j in range(n):
-                earlier[j] += A[t, i, j] * p[i]
-        p[:] = earlier
-    return gradient
-
-
-@compiled
 def _product(left: np.ndarray, right: np.ndarray, out: np.ndarray) -> None:
     """out = left right, row by row, so that the inner loop runs along memory."""
     for i in range(left.shape[0]):

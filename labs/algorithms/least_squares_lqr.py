@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from labs.errors import LabError
-from labs.problems.linear_quadratic import LqrProblem
+from labs.problems.linear_quadratic import LqrProblem, weight_roots
 
 LARGEST = 40_000_000
 """Entries of a matrix worth building: 320 MB."""
@@ -47,9 +47,9 @@ def solve_at_once(problem: LqrProblem, x0: np.ndarray) -> np.ndarray:
             f"{LARGEST}: shorten the horizon, or solve this by Riccati"
         )
     h, g = trajectory_map(problem)
-    by_x = np.broadcast_to(_roots(problem.terms["q"]), (steps, n, n)).copy()
-    by_x[:-1], by_x[-1] = by_x[1:], _roots(problem.terms["q_final"])[0]
-    by_u = np.broadcast_to(_roots(problem.terms["r"]), (steps, m, m))
+    by_x = np.broadcast_to(weight_roots(problem.terms["q"]), (steps, n, n)).copy()
+    by_x[:-1], by_x[-1] = by_x[1:], weight_roots(problem.terms["q_final"])[0]
+    by_u = np.broadcast_to(weight_roots(problem.terms["r"]), (steps, m, m))
     rows, target = np.zeros((steps * (n + m), steps * m)), np.zeros(steps * (n + m))
     rows[: steps * n] = (by_x @ g.reshape(steps, n, steps * m)).reshape(steps * n, steps * m)
     target[: steps * n] = -(by_x @ (h @ x0).reshape(steps, n, 1)).ravel()
@@ -58,12 +58,3 @@ def solve_at_once(problem: LqrProblem, x0: np.ndarray) -> np.ndarray:
     triangle = np.asarray(np.linalg.qr(np.column_stack([rows, target]), mode="r"))
     u: np.ndarray = solve_triangular(triangle[:-1, :-1], triangle[:-1, -1])
     return u.reshape(steps, m)
-
-
-def _roots(weights: np.ndarray) -> np.ndarray:
-    """Matrices whose squares, transpose times itself, are these semidefinite ones (k, n, n)."""
-    share, directions = np.linalg.eigh(weights)
-    roots: np.ndarray = np.sqrt(np.clip(share, 0.0, None))[:, :, None] * directions.transpose(
-        0, 2, 1
-    )
-    return roots

@@ -20,11 +20,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labs.algorithms.riccati import solve
+from labs.algorithms.riccati_recursion import relative_change
 from labs.errors import LabError
 from labs.problems.linear_quadratic import LqrPolicy, LqrProblem
 
 TOLERANCE, MOST = 1e-9, 400
-"""Laps end when P_0 and p_0 change by less than this share of their largest entries; how many."""
+"""Laps end when P_0 and p_0 change by less than this share; how many."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +39,10 @@ class Periodic:
     laps: int
     """It took to settle."""
     residual: float
-    """Change in the last lap, as a share of the largest entries."""
+    """Change in the last lap: the larger of |dP_ij| / sqrt(P_ii P_jj), and of |dp_i| / sqrt(P_ii)
+    as a share of the largest |p_i| / sqrt(P_ii). Neither depends on the units of x."""
+    radius: float
+    """Spectral radius of a lap, of the product of all A + B K."""
 
     @property
     def lap_cost(self) -> float:
@@ -48,14 +52,24 @@ class Periodic:
 
 def periodic(lap: LqrProblem) -> Periodic:
     """The policy for a lap that repeats for ever; its terminal terms do not matter. Raises
-    LabError where it does not settle."""
-    p, linear = lap.terms["q"][0], np.zeros(lap.n)
+    LabError where it does not settle, or settles on one that does not stabilise."""
+    p, linear, radius = lap.terms["q"][0], np.zeros(lap.n), np.inf
     for laps in range(1, MOST + 1):
         policy = solve(replace(lap, q_final=p, q_final_linear=linear, constant_final=0.0))
-        residual = max(_change(policy.values[0], p), _change(policy.linear[0], linear))
+        residual = max(
+            relative_change(policy.values[0], p),
+            _linear_change(policy.linear[0], linear, policy.values[0]),
+        )
         if residual < TOLERANCE:
-            return Periodic(lap, policy, laps, residual)
+            radius = _radius(lap, policy)
+            if radius < 1.0:
+                return Periodic(lap, policy, laps, residual, radius)
         p, linear = policy.values[0], policy.linear[0]
+    if residual < TOLERANCE:
+        raise LabError(
+            f"after {MOST} laps the regulator rests, but what it regulates grows by a factor of "
+            f"{radius:.6g} a lap: put a weight on what does not decay"
+        )
     raise LabError(
         f"after {MOST} laps the regulator still changes by {residual:.1e} of its size a lap: raise "
         "the weight of what moves slowly, or give B a grip on it"
@@ -95,7 +109,19 @@ def _seen(term: np.ndarray, index: np.ndarray) -> np.ndarray:
     return term[index] if term.ndim == 3 else term
 
 
-def _change(new: np.ndarray, old: np.ndarray) -> float:
-    """Largest change as a share of the largest entry."""
-    size = float(np.abs(new).max())
-    return float(np.abs(new - old).max()) / size if size > 0.0 else 0.0
+def _linear_change(new: np.ndarray, old: np.ndarray, p: np.ndarray) -> float:
+    """Largest change of the linear term, its entries in units of sqrt(P_ii), as a share of the
+    largest."""
+    size = np.sqrt(np.maximum(p.diagonal(), 0.0))
+    units = np.where(size > 0.0, size, 1.0)
+    largest = float(np.abs(new / units).max())
+    change = float(np.abs((new - old) / units).max())
+    return change / largest if largest > 0.0 else change
+
+
+def _radius(lap: LqrProblem, policy: LqrPolicy) -> float:
+    """The spectral radius of a lap under the policy."""
+    a, b, turn = lap.terms["a"], lap.terms["b"], np.eye(lap.n)
+    for t, gain in enumerate(policy.gains):
+        turn = (a[t % len(a)] + b[t % len(b)] @ gain) @ turn
+    return float(np.abs(np.linalg.eigvals(turn)).max())

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labs.problems.optimal_control import Model
+from labs.problems.optimal_control import Expansion
 
 SMALLEST = 1e-7
 """Below this part of the size of Q_uu mu is zero."""
@@ -30,7 +30,7 @@ class Regularisation(NamedTuple):
         return mu / self.factor if mu / self.factor >= self.smallest else 0.0
 
 
-def regularisation(model: Model, factor: float, limit: float) -> Regularisation:
+def regularisation(model: Expansion, factor: float, limit: float) -> Regularisation:
     """With `limit` in parts of the size of Q_uu: of the largest entry on the diagonals of
     l_uu + f_u' l_xx f_u, which is what Q_uu is one step before an end."""
     ahead = np.einsum("tki,tkl,tli->ti", model.B, model.cost.l_xx[1:], model.B)

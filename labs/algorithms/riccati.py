@@ -6,9 +6,8 @@ It stays quadratic, V_t(x) = x' P_t x: with P_N = Q_f, backward from t = N - 1,
     K_t = -(R + B' P_(t+1) B)^-1 (B' P_(t+1) A + S')
     P_t = Q + A' P_(t+1) A + (A' P_(t+1) B + S) K_t.
 
-Linear and constant terms are carried by the augmented state (x, 1). In the arithmetic, with
-R + B' P B = L L' and Y = L^-1 (B' P A + S'):  K = -L'^-1 Y  and  P = Q + A' P A - Y' Y.
-One step takes some 4 n^2 (n + m) operations, so N steps take O(N).
+Linear and constant terms are carried by the augmented state (x, 1). One step takes some
+4 n^2 (n + m) operations (`riccati_recursion`), so N steps take O(N).
 
 As t decreases P_t usually converges to P_s (2.4.2), the fixed point of this map, the discrete
 algebraic Riccati equation.
@@ -19,10 +18,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
+from labs.algorithms.riccati_recursion import backward, iterate
 from labs.algorithms.stabilizability import require_detectable, require_stabilizable
-from labs.compiled import compiled
 from labs.errors import LabError
 from labs.problems.linear_quadratic import LqrPolicy, LqrProblem
+
+SOLVED = 1e-6
+"""What SciPy's P may change in one more step, as a share of it, to count as a solution."""
 
 
 def solve(problem: LqrProblem) -> LqrPolicy:
@@ -35,7 +37,7 @@ def solve(problem: LqrProblem) -> LqrPolicy:
     values[steps] = terms["q_final"][0]
     # Compiled for one layout of memory: another one would be compiled while somebody waits.
     a, b, q, r, s = (np.ascontiguousarray(terms[name]) for name in "abqrs")
-    failed = _backward(a, b, q, r, s, values, gains)
+    failed = backward(a, b, q, r, s, values, gains)
     if failed >= 0:
         raise LabError(
             f"P grows beyond all numbers {steps - failed} steps before the end of N = {steps}: "
@@ -64,9 +66,12 @@ class SteadyState:
     iterations: int
     """Steps of the recursion; 0 where SciPy solved the equation itself."""
     residual: float
-    """Largest entry of one more step's change, as a share of P's largest."""
+    """Change of P in one more step, as a share of P: the largest |dP_ij| / sqrt(P_ii P_jj), which
+    is the same in all units of the coordinates."""
+    radius: float
+    """Spectral radius of A + B K."""
     trouble: str = ""
-    """Empty where it is solved, else a sentence."""
+    """Empty where P solves its equation and K stabilises, else a sentence."""
 
 
 def steady_state(
@@ -77,38 +82,68 @@ def steady_state(
     tolerance: float = 1e-13,
     most: int = 100_000,
 ) -> SteadyState:
-    """Iterates the recursion from P = Q until a step changes no entry of P by more than
-    `tolerance` of the largest, at most `most` times. A (n, n), B (n, m), Q (n, n), R (m, m).
-    Raises LabError where there is no steady state: (A, B) is not stabilizable, or Q does not see
-    a mode that does not decay."""
+    """Iterates the recursion from P = Q, at most `most` times, until a step changes no P_ij by more
+    than `tolerance` of sqrt(P_ii P_jj) and K stabilises: along a mode that grows slowly and costs
+    next to nothing, P rests for long near zero. A (n, n), B (n, m), Q (n, n), R (m, m). Raises
+    LabError where there is no steady state: (A, B) is not stabilizable, or Q does not see a mode
+    that does not decay."""
     terms = _lasting(a, b, q, r)
     values, gain = np.stack([q, q]).astype(float), np.zeros(b.T.shape)
-    iterations, residual = _iterate(*terms, values, gain, tolerance, most)
+    iterations, more, residual, radius = 0, most, np.inf, np.inf
+    while more > 0:
+        count, residual = iterate(*terms, values, gain, tolerance, more)
+        iterations += count
+        radius = _radius(a + b @ gain)
+        if radius < 1.0 or not np.isfinite(residual):
+            break
+        # It rests and does not stabilise: onwards, blindly, for as many steps again.
+        blind = min(iterations, most - iterations)
+        if blind > 0:
+            iterate(*terms, values, gain, -1.0, blind)
+        iterations += blind
+        more = most - iterations
     trouble = ""
-    if not residual <= tolerance:
+    if not np.isfinite(residual):
+        trouble = (
+            f"After {iterations} steps the recursion breaks off: R + B' P B is not positive "
+            "definite to the last digit. Bring the weights closer together."
+        )
+    elif not residual <= tolerance:
         trouble = (
             f"After {iterations} steps of the recursion P still changes by {residual:.1e} of its "
             "size a step: allow more of them, or make the loop faster by raising Q or lowering R."
         )
-    return SteadyState(gain, values[0].copy(), iterations, residual, trouble)
+    elif not radius < 1.0:
+        trouble = _unstable(radius)
+    return SteadyState(gain, values[0].copy(), iterations, residual, radius, trouble)
 
 
 def steady_state_directly(
     a: np.ndarray, b: np.ndarray, q: np.ndarray, r: np.ndarray
 ) -> SteadyState:
-    """The same by SciPy, from the eigenvectors of the extended symplectic pencil. Raises LabError
-    as `steady_state` does, and where SciPy finds no solution."""
+    """The same by SciPy, from the eigenvectors of the extended symplectic pencil. K is that of one
+    more step of the recursion. Raises LabError as `steady_state` does, and where SciPy finds no
+    solution."""
     terms = _lasting(a, b, q, r)
     try:
         p = solve_discrete_are(a, b, q, r)
-    except np.linalg.LinAlgError as error:
+    except (np.linalg.LinAlgError, ValueError) as error:
         raise LabError(
             f"SciPy does not solve the Riccati equation ({error}): bring the weights closer "
             "together, or the step away from zero"
         ) from None
     values, gain = np.stack([p, p]), np.zeros(b.T.shape)
-    residual = _iterate(*terms, values, gain, 0.0, 1)[1]
-    return SteadyState(gain, p, 0, residual)
+    residual = iterate(*terms, values, gain, 0.0, 1)[1]
+    radius, trouble = _radius(a + b @ gain), ""
+    if not residual <= SOLVED:
+        trouble = (
+            f"SciPy's P does not solve the Riccati equation: one more step of the recursion "
+            f"changes it by {residual:.1e} of its size. Iterate the recursion, or bring the "
+            "weights closer together."
+        )
+    elif not radius < 1.0:
+        trouble = _unstable(radius)
+    return SteadyState(gain, p, 0, residual, radius, trouble)
 
 
 def prepare() -> None:
@@ -116,6 +151,18 @@ def prepare() -> None:
     one = np.eye(1)
     solve(LqrProblem(1, one, one, one, one, one))
     steady_state(one, one, one, one)
+
+
+def _radius(loop: np.ndarray) -> float:
+    """The spectral radius."""
+    return float(np.abs(np.linalg.eigvals(loop)).max()) if np.isfinite(loop).all() else np.inf
+
+
+def _unstable(radius: float) -> str:
+    return (
+        "P solves the Riccati equation, but its gain does not stabilise: A + B K has an "
+        f"eigenvalue of magnitude {radius:.9g}. Raise the weight of what does not decay."
+    )
 
 
 def _lasting(
@@ -127,135 +174,3 @@ def _lasting(
     require_detectable(a, q)
     terms = problem.terms
     return terms["a"], terms["b"], terms["q"], terms["r"], terms["s"]
-
-
-@compiled
-def _backward(
-    a: np.ndarray,
-    b: np.ndarray,
-    q: np.ndarray,
-    r: np.ndarray,
-    s: np.ndarray,
-    values: np.ndarray,
-    gains: np.ndarray,
-) -> int:
-    """Fills values (N + 1, n, n) from its last, and gains (N, m, n). The terms are stacks of N or
-    1. Returns the step at which it fails, or -1."""
-    steps, m, n = gains.shape
-    pa, pb, h = np.empty((n, n)), np.empty((n, m)), np.empty((m, m))
-    for t in range(steps - 1, -1, -1):
-        sound = _step(
-            a[t % len(a)],
-            b[t % len(b)],
-            q[t % len(q)],
-            r[t % len(r)],
-            s[t % len(s)],
-            values[t + 1],
-            values[t],
-            gains[t],
-            pa,
-            pb,
-            h,
-        )
-        if not sound:
-            return t
-    return -1
-
-
-@compiled
-def _iterate(
-    a: np.ndarray,
-    b: np.ndarray,
-    q: np.ndarray,
-    r: np.ndarray,
-    s: np.ndarray,
-    values: np.ndarray,
-    gain: np.ndarray,
-    tolerance: float,
-    most: int,
-) -> tuple[int, float]:
-    """Steps from P = values[0] until it rests; leaves P there and K in gain. Returns how many
-    steps it took and the relative change in the last."""
-    n, m = b.shape[1:]
-    pa, pb, h = np.empty((n, n)), np.empty((n, m)), np.empty((m, m))
-    change = np.inf
-    for count in range(1, most + 1):
-        sound = _step(a[0], b[0], q[0], r[0], s[0], values[0], values[1], gain, pa, pb, h)
-        size = np.abs(values[1]).max()
-        change = np.abs(values[1] - values[0]).max() / size if size > 0.0 else 0.0
-        values[0] = values[1]
-        if not sound or change <= tolerance:
-            return count, change
-    return most, change
-
-
-@compiled
-def _step(
-    a: np.ndarray,
-    b: np.ndarray,
-    q: np.ndarray,
-    r: np.ndarray,
-    s: np.ndarray,
-    p: np.ndarray,
-    value: np.ndarray,
-    gain: np.ndarray,
-    pa: np.ndarray,
-    pb: np.ndarray,
-    h: np.ndarray,
-) -> bool:
-    """One step of the recursion: P_t into value (n, n) and K_t into gain (m, n) from P_(t+1) = p.
-    pa (n, n), pb (n, m) and h (m, m) are workspaces. Sums run along rows, as memory does.
-    Returns whether R + B' P B was positive definite and all stayed finite."""
-    n, m = b.shape
-    pa[:], pb[:], h[:], value[:] = 0.0, 0.0, r, q
-    for i in range(n):
-        for k in range(n):
-            pik = p[i, k]
-            for j in range(n):
-                pa[i, j] += pik * a[k, j]
-            for j in range(m):
-                pb[i, j] += pik * b[k, j]
-        for j in range(m):
-            gain[j, i] = s[i, j]
-    for k in range(n):
-        for i in range(n):
-            aki = a[k, i]
-            for j in range(n):
-                value[i, j] += aki * pa[k, j]
-        for i in range(m):
-            bki = b[k, i]
-            for j in range(n):
-                gain[i, j] += bki * pa[k, j]
-            for j in range(m):
-                h[i, j] += bki * pb[k, j]
-    for i in range(m):  # h = L L' in its lower half, gain = L^-1 (B' P A + S')
-        for k in range(i + 1):
-            total = h[i, k]
-            for j in range(k):
-                total -= h[i, j] * h[k, j]
-            if k < i:
-                h[i, k] = total / h[k, k]
-            elif total > 0.0:
-                h[i, i] = np.sqrt(total)
-            else:
-                return False
-        for k in range(i):
-            for j in range(n):
-                gain[i, j] -= h[i, k] * gain[k, j]
-        for j in range(n):
-            gain[i, j] /= h[i, i]
-        for k in range(n):
-            for j in range(n):
-                value[k, j] -= gain[i, k] * gain[i, j]
-    for i in range(m - 1, -1, -1):  # gain = -L'^-1 gain
-        for k in range(i + 1, m):
-            for j in range(n):
-                gain[i, j] += h[k, i] * gain[k, j]
-        for j in range(n):
-            gain[i, j] /= -h[i, i]
-    finite = True
-    for i in range(n):
-        for j in range(i + 1):
-            value[i, j] = value[j, i] = 0.5 * (value[i, j] + value[j, i])
-            finite = finite and np.isfinite(value[i, j])
-    return bool(finite)

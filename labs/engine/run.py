@@ -54,8 +54,10 @@ class World:
         else:
             self.reset()
 
-    def reset(self) -> None:
-        """Back to t = 0 with the present parameters; recording and events begin anew."""
+    def reset(self, seed: int | None = None) -> None:
+        """Back to t = 0 with the present parameters, and another seed if one is given; recording
+        and events begin anew."""
+        self.seed = self.seed if seed is None else seed
         self._begin(None, None)
 
     def load(self, solution: Solution) -> None:

@@ -19,7 +19,7 @@ from labs.shapes import BLUE, DARK, LIGHT, ORANGE, Box, Cylinder, Sphere, primit
 
 CART, POLE, LENGTH, RADIUS = 1.0, 0.3, 0.6, 0.015
 """Masses of cart and rod [kg], length and radius of the rod [m]."""
-HEIGHT, REACH = 0.75, 1.5
+HINGE_HEIGHT, HALF_RAIL = 0.75, 1.5
 """Of the hinge over the floor; half the rail's length [m]. The rail has no end stops."""
 
 
@@ -28,20 +28,21 @@ def cart_pole() -> Arm:
     """The cart with its pole, its tip the pole's free end."""
     model = pin.Model()
     model.name = "cart_pole"
-    cart = model.addJoint(0, pin.JointModelPY(), translation(0.0, 0.0, HEIGHT), "cart")
+    cart = model.addJoint(0, pin.JointModelPY(), translation(0.0, 0.0, HINGE_HEIGHT), "cart")
     hinge = model.addJoint(cart, pin.JointModelRX(), pin.SE3.Identity(), "hinge")
     middle, end = translation(0.0, 0.0, -LENGTH / 2), translation(0.0, 0.0, -LENGTH)
     box, below = (0.16, 0.24, 0.1), translation(-0.1, 0.0, 0.0)
     model.appendBodyToJoint(cart, pin.Inertia.FromBox(CART, *box), below)
     model.appendBodyToJoint(hinge, pin.Inertia.FromCylinder(POLE, RADIUS, LENGTH), middle)
     tip = model.addFrame(pin.Frame("tip", hinge, end, pin.FrameType.OP_FRAME))
-    along = pin.SE3(pin.rpy.rpyToMatrix(-np.pi / 2, 0.0, 0.0), np.array([-0.1, 0.0, HEIGHT]))
+    along = pin.SE3(pin.rpy.rpyToMatrix(-np.pi / 2, 0.0, 0.0), np.array([-0.1, 0.0, HINGE_HEIGHT]))
     axle = pin.SE3(pin.rpy.rpyToMatrix(0.0, np.pi / 2, 0.0), np.array([-0.02, 0.0, 0.0]))
+    post = Box((0.05, 0.05, HINGE_HEIGHT))
     visuals = (
-        primitive(0, along, Cylinder(0.018, 2 * REACH), LIGHT),
+        primitive(0, along, Cylinder(0.018, 2 * HALF_RAIL), LIGHT),
         *(
-            primitive(0, translation(-0.1, y, HEIGHT / 2), Box((0.05, 0.05, HEIGHT)), DARK)
-            for y in (-REACH, REACH)
+            primitive(0, translation(-0.1, y, HINGE_HEIGHT / 2), post, DARK)
+            for y in (-HALF_RAIL, HALF_RAIL)
         ),
         primitive(cart, below, Box(box), BLUE),
         primitive(cart, axle, Cylinder(0.02, 0.1), DARK),

@@ -18,21 +18,32 @@ from labs.errors import LabError
 from labs.models.arms import Arm, load
 from labs.models.cart_pole import cart_pole
 from labs.models.pendulums import hanging
-from labs.models.plant import laden
+from labs.models.plant import Force, Plant, laden
 
 
 @dataclass(frozen=True, eq=False)
 class Mechanism:
-    """One mechanism. `data` is a workspace: its contents mean nothing between calls."""
+    """One mechanism: a plant, and which of its joints are driven."""
 
     name: str
-    arm: Arm
-    """What draws it."""
-    model: pin.Model
-    data: pin.Data
+    plant: Plant
     driven: tuple[int, ...]
     """Indices of the joints that have a motor."""
     friction: float
+
+    @property
+    def arm(self) -> Arm:
+        """What draws it."""
+        return self.plant.arm
+
+    @property
+    def model(self) -> pin.Model:
+        return self.plant.model
+
+    @property
+    def data(self) -> pin.Data:
+        """A workspace: its contents mean nothing between calls."""
+        return self.plant.data
 
     @property
     def nq(self) -> int:
@@ -56,16 +67,16 @@ class Mechanism:
         """(nu,) [N m; N]: what each motor can give, in either direction."""
         return self.arm.torque_limit[list(self.driven)]
 
-    def acceleration(self, held: np.ndarray) -> Acceleration:
-        """a(q, v) under the control `held` (nu,) [N m; N]. It is read at every call, so whoever
-        holds the array may write the next control into it."""
-        aba, model, data, b = pin.aba, self.model, self.data, self.friction
-        if self.nu < self.nq:
-            S = self.S
-            return lambda q, v: aba(model, data, q, v, S @ held - b * v)
-        if b > 0.0:
-            return lambda q, v: aba(model, data, q, v, held - b * v)
-        return lambda q, v: aba(model, data, q, v, held)
+    def acceleration(self, held: np.ndarray, force: Force | None = None) -> Acceleration:
+        """a(q, v) under the control `held` (nu,) [N m; N] and a force on the tip. The control is
+        read at every call, so whoever holds the array may write the next one into it."""
+        if self.nu == self.nq:
+            return self.plant.acceleration(held, self.friction, force)
+        aba, model, data, b, S = pin.aba, self.model, self.data, self.friction, self.S
+        if force is not None:
+            pushed = self.plant.torque_of(force)
+            return lambda q, v: aba(model, data, q, v, S @ held - b * v + pushed(q))
+        return lambda q, v: aba(model, data, q, v, S @ held - b * v)
 
     def f(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """x' (nx,)."""
@@ -110,18 +121,17 @@ class Mechanism:
 
     def tip(self, q: np.ndarray) -> np.ndarray:
         """Position of the tip (3,) [m]."""
-        pin.framesForwardKinematics(self.model, self.data, q)
-        position: np.ndarray = self.data.oMf[self.arm.tip].translation.copy()
-        return position
+        return self.plant.tip(q)
 
     def tip_jacobian(self, q: np.ndarray) -> np.ndarray:
         """J(q), (3, nv): velocity of the tip in the world's axes is J(q) q'."""
-        axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-        jacobian: np.ndarray = pin.computeFrameJacobian(
-            self.model, self.data, q, self.arm.tip, axes
-        )
-        # Of a single joint, Pinocchio gives a vector.
-        return jacobian.reshape(6, -1)[:3]
+        return self.plant.tip_jacobian(q)
+
+    def velocity_jump(self, q: np.ndarray, impulse: np.ndarray) -> np.ndarray:
+        """How v (nv,) changes when an impulse (3,) [N s] strikes the tip at q: M^-1 J' impulse."""
+        J = self.tip_jacobian(q)
+        inverse = np.reshape(pin.computeMinverse(self.model, self.data, q), (len(q), len(q)))
+        return np.asarray(inverse @ J.T @ impulse)
 
 
 MECHANISMS: Mapping[str, tuple[Callable[[], Arm], tuple[int, ...]]] = {
@@ -145,4 +155,4 @@ def mechanism(name: str, payload: float = 0.0, friction: float = 0.0) -> Mechani
     build, driven = MECHANISMS[name]
     arm = build()
     model = laden(arm, payload)
-    return Mechanism(name, arm, model, model.createData(), driven, friction)
+    return Mechanism(name, Plant(arm, model, model.createData()), driven, friction)

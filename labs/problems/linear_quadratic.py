@@ -20,7 +20,10 @@ import numpy as np
 from labs.errors import LabError
 
 NEGLIGIBLE = 1e-9
-"""An asymmetry or a negative eigenvalue of at most this share of the largest entry is rounding."""
+"""An asymmetry or a negative eigenvalue of at most this, of a weight scaled to a diagonal of ones,
+is rounding."""
+ROUNDING = 1e-13
+"""An eigenvalue of at most this, likewise, is zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,9 +119,9 @@ class LqrProblem:
         """J of a trajectory: x (N + 1, n), u (N, m)."""
         terms, end = self.terms, x[-1]
         stage = (
-            np.einsum("ti,tij,tj->t", x[:-1], _every(terms["q"], self.horizon), x[:-1])
-            + np.einsum("ti,tij,tj->t", u, _every(terms["r"], self.horizon), u)
-            + 2.0 * np.einsum("ti,tij,tj->t", x[:-1], _every(terms["s"], self.horizon), u)
+            np.einsum("ti,tij,tj->t", x[:-1], _broadcast(terms["q"], self.horizon), x[:-1])
+            + np.einsum("ti,tij,tj->t", u, _broadcast(terms["r"], self.horizon), u)
+            + 2.0 * np.einsum("ti,tij,tj->t", x[:-1], _broadcast(terms["s"], self.horizon), u)
             + 2.0 * (terms["q_linear"] * x[:-1]).sum(axis=1)
             + 2.0 * (terms["s_linear"] * u).sum(axis=1)
             + terms["constant"]
@@ -128,7 +131,7 @@ class LqrProblem:
 
     def follow(self, policy: "LqrPolicy", x0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """x (N + 1, n) and u (N, m) from x0 (n,) under the policy."""
-        a, b, c = (_every(self.terms[name], self.horizon) for name in "abc")
+        a, b, c = (_broadcast(self.terms[name], self.horizon) for name in "abc")
         x, u = np.zeros((self.horizon + 1, self.n)), np.zeros((self.horizon, self.m))
         x[0] = x0
         for t in range(self.horizon):
@@ -228,25 +231,50 @@ def check_shape(name: str, array: np.ndarray, shape: tuple[int, ...], horizon: i
 
 def check_weight(name: str, stack: np.ndarray, definite: bool = False) -> None:
     """Raises LabError unless each of the matrices (k, n, n) is symmetric and positive
-    semidefinite, or definite."""
-    size = np.abs(stack).max(axis=(1, 2))
-    skew = np.abs(stack - stack.transpose(0, 2, 1)).max(axis=(1, 2))
-    if (skew > NEGLIGIBLE * size).any():
-        raise LabError(f"{name} is not symmetric: entries differ by {skew.max():.3g} across it")
-    least = np.linalg.eigvalsh(stack)[:, 0]
+    semidefinite, or definite. What is rounding is told in the units that make the diagonal one."""
+    units = unit_scale(stack)
+    scaled = units[:, :, None] * stack * units[:, None, :]
+    skew = np.abs(scaled - scaled.transpose(0, 2, 1)) > NEGLIGIBLE
+    if skew.any():
+        apart = np.abs(stack - stack.transpose(0, 2, 1))[skew].max()
+        raise LabError(f"{name} is not symmetric: entries differ by {apart:.3g} across it")
+    least, size = np.linalg.eigvalsh(scaled)[:, 0], np.abs(scaled).max(axis=(1, 2))
     if definite and (least <= 0.0).any():
         raise LabError(
-            f"{name} has an eigenvalue {least.min():.3g}: it takes a positive definite matrix, "
+            f"{name} has an eigenvalue {_least(stack):.3g}: it takes a positive definite matrix, "
             "all eigenvalues above zero"
         )
     if (least < -NEGLIGIBLE * size).any():
         raise LabError(
-            f"{name} has an eigenvalue {least.min():.3g}: it takes a positive semidefinite "
+            f"{name} has an eigenvalue {_least(stack):.3g}: it takes a positive semidefinite "
             "matrix, no eigenvalue below zero"
         )
 
 
-def _every(stack: np.ndarray, horizon: int) -> np.ndarray:
+def unit_scale(stack: np.ndarray) -> np.ndarray:
+    """Units d (k, n) in which d_i W_ij d_j has ones on its diagonal, or minus ones; 1 where the
+    matrices W (k, n, n) have a zero there."""
+    diagonal = np.abs(np.einsum("kii->ki", stack))
+    return np.asarray(1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)))
+
+
+def weight_roots(stack: np.ndarray) -> np.ndarray:
+    """Matrices V (k, n, n) with V' V = W of semidefinite W (k, n, n), each entry to the accuracy
+    of its own row: by the eigenvectors of W in units that make its diagonal one."""
+    units = unit_scale(stack)
+    share, directions = np.linalg.eigh(units[:, :, None] * stack * units[:, None, :])
+    share[share <= ROUNDING] = 0.0
+    scaled = np.sqrt(share)[:, :, None] * directions.transpose(0, 2, 1)
+    roots: np.ndarray = scaled / units[:, None, :]
+    return roots
+
+
+def _least(stack: np.ndarray) -> float:
+    """The least eigenvalue."""
+    return float(np.linalg.eigvalsh(stack).min())
+
+
+def _broadcast(stack: np.ndarray, horizon: int) -> np.ndarray:
     """The terms (N or 1, ...) as a view of N of them."""
     return np.broadcast_to(stack, (horizon, *stack.shape[1:]))
 
@@ -254,5 +282,5 @@ def _every(stack: np.ndarray, horizon: int) -> np.ndarray:
 def _blocks(rows: Sequence[Sequence[np.ndarray]]) -> np.ndarray:
     """Stacks of matrices (k or 1, ., .) put together as the blocks of larger ones."""
     steps = max(len(part) for row in rows for part in row)
-    joined = [np.concatenate([_every(part, steps) for part in row], axis=2) for row in rows]
+    joined = [np.concatenate([_broadcast(part, steps) for part in row], axis=2) for row in rows]
     return np.concatenate(joined, axis=1)

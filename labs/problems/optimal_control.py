@@ -2,26 +2,20 @@
 
     minimise J(U) = sum_(t<N) l(x_t, u_t) + l_f(x_N)   subject to  x_(t+1) = f(x_t, u_t),  x_0 given
 
-Here are the interfaces of f and J, their expansion about a trajectory, the rollout of a policy,
-and the gradient dJ/dU.
+Here are the interfaces of f and J, their expansion about a trajectory, and the rollout of a
+policy.
 """
 
-from collections.abc import Generator
 from dataclasses import dataclass
-from time import perf_counter
-from typing import NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from labs.algorithms.ddp_sweep import costate
 from labs.errors import LabError
+from labs.resumable import Resumable
 
-T = TypeVar("T")
-
-FARTHEST = 1e6
+LARGEST_STATE = 1e6
 """A state beyond this, in its units, has diverged."""
-AT_BOUND = 1e-12
-"""A control within this part of its bound is at it: sums such as U + w round."""
 
 
 class Dynamics(Protocol):
@@ -68,7 +62,7 @@ class Cost(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class OptimalControlProblem:
     """What is to be minimised, over N controls from x_0. `bound` (nu,) limits |u|; None: no
     limit. Raises LabError where shapes do not fit."""
 
@@ -88,8 +82,8 @@ class Problem:
             raise LabError(f"the bound on |u| is {self.bound}; it takes {nu} positive numbers")
 
 
-class Model(NamedTuple):
-    """The expansion about a trajectory."""
+class Expansion(NamedTuple):
+    """First derivatives of the dynamics about a trajectory, second ones or none, and the cost's."""
 
     A: np.ndarray
     B: np.ndarray
@@ -97,44 +91,18 @@ class Model(NamedTuple):
     cost: CostDerivatives
 
 
-Pieces = Generator[None, None, T]
-"""Work that pauses now and then, so that something else can be done in between."""
-
-
-def whole(pieces: Pieces[T]) -> T:
-    """All of it at once."""
-    while True:
-        try:
-            next(pieces)
-        except StopIteration as end:
-            result: T = end.value
-            return result
-
-
-def timed(pieces: Pieces[T], seconds: dict[str, float], phase: str) -> Pieces[T]:
-    """Adds up in seconds[phase] what the pieces take, without the pauses."""
-    while True:
-        begun = perf_counter()
-        try:
-            next(pieces)
-        except StopIteration as end:
-            result: T = end.value
-            return result
-        finally:
-            seconds[phase] += perf_counter() - begun
-        yield
-
-
-def expand(problem: Problem, X: np.ndarray, U: np.ndarray, second_order: bool) -> Pieces[Model]:
+def expand(
+    problem: OptimalControlProblem, X: np.ndarray, U: np.ndarray, second_order: bool
+) -> Resumable[Expansion]:
     """The derivatives of dynamics and cost along a trajectory."""
     _, A, B = problem.dynamics.linearize(X, U)
     second = np.empty((0, 0, 0, 0))
     if second_order:
         second = yield from second_derivatives(problem.dynamics, X, U)
-    return Model(A, B, second, problem.cost.derivatives(X, U, second_order))
+    return Expansion(A, B, second, problem.cost.derivatives(X, U, second_order))
 
 
-def second_derivatives(dynamics: Dynamics, X: np.ndarray, U: np.ndarray) -> Pieces[np.ndarray]:
+def second_derivatives(dynamics: Dynamics, X: np.ndarray, U: np.ndarray) -> Resumable[np.ndarray]:
     """f'' (N, nx, nx + nu, nx + nu) over (x, u), by central differences of the analytical f_x and
     f_u: Pinocchio has no second derivatives of forward dynamics. The error is some 1e-9 of f''."""
     N, n, m = len(U), dynamics.nx, dynamics.nu
@@ -155,7 +123,7 @@ def second_derivatives(dynamics: Dynamics, X: np.ndarray, U: np.ndarray) -> Piec
 
 
 def rollout(
-    problem: Problem, X: np.ndarray, U: np.ndarray, K: np.ndarray
+    problem: OptimalControlProblem, X: np.ndarray, U: np.ndarray, K: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """States, controls and cost under u = U + K (x - X), within the bound; cost infinite from
     where it diverges."""
@@ -169,7 +137,7 @@ def rollout(
             if bound is not None:
                 np.clip(u, -bound, bound, out=u)
             x = new_X[t + 1] = f(x, u)
-        if not np.abs(new_X).max() <= FARTHEST:
+        if not np.abs(new_X).max() <= LARGEST_STATE:
             return new_X, new_U, np.inf
         return new_X, new_U, problem.cost.value(new_X, new_U)
 
@@ -177,13 +145,4 @@ def rollout(
 def diverges_at(X: np.ndarray) -> int:
     """The first step of a diverged trajectory that is too far out."""
     with np.errstate(invalid="ignore"):
-        return int(np.argmax(~(np.abs(X).max(axis=1) <= FARTHEST)))
-
-
-def gradient_norm(problem: Problem, model: Model, U: np.ndarray) -> float:
-    """max |dJ/dU| on the trajectory the model is about, without what pushes against the bound."""
-    gradient = costate(model.A, model.B, model.cost.l_x, model.cost.l_u)
-    if problem.bound is not None:
-        most = (1.0 - AT_BOUND) * problem.bound
-        gradient[((most <= U) & (gradient < 0.0)) | ((-most >= U) & (gradient > 0.0))] = 0.0
-    return float(np.abs(gradient).max())
+        return int(np.argmax(~(np.abs(X).max(axis=1) <= LARGEST_STATE)))

@@ -16,7 +16,7 @@ import { toast } from "./toast.js";
 import { Transport } from "./transport.js";
 
 const lab = JSON.parse(document.getElementById("lab-data").textContent);
-const session = new Session(lab, document.getElementById("robot"), readLink(lab.params), view);
+const session = new Session(lab, document.getElementById("robot"), readLink(), view);
 const stage = new Stage();
 const board = new Board(lab);
 const transport = new Transport(send);

@@ -1,18 +1,12 @@
 // The page's address encodes what is on screen: every parameter that differs from its default,
 // and the seed. Opened elsewhere, it shows the same.
 
-export function readLink(tunables) {
-  const params = {};
-  let seed = 0;
-  for (const [name, text] of new URLSearchParams(location.search)) {
-    if (name === "seed") {
-      seed = Number(text);
-      continue;
-    }
-    params[name] = fromText(text, tunables.find((tunable) => tunable.name === name));
-  }
-  const valid = Number.isInteger(seed) && seed >= 0 && seed <= 0xffffffff;
-  return { params, seed: valid ? seed : 0 };
+// The server knows what the texts mean, and says what is wrong with them.
+export function readLink() {
+  const { seed = "", ...link } = Object.fromEntries(new URLSearchParams(location.search));
+  const number = Number(seed);
+  const valid = Number.isInteger(number) && number >= 0 && number <= 0xffffffff;
+  return { link, seed: valid ? number : 0 };
 }
 
 export function linkOf(tunables, params, seed) {
@@ -32,17 +26,4 @@ export function writeLink(link) {
   timer = setTimeout(() => {
     if (link !== location.pathname + location.search) history.replaceState(null, "", link + location.hash);
   }, 200);
-}
-
-function fromText(text, tunable) {
-  if (tunable?.kind === "choice") {
-    const option = tunable.options.find(({ value }) => String(value) === text);
-    if (option) return option.value;
-  }
-  if (tunable?.kind === "toggle") {
-    return { true: true, 1: true, on: true, false: false, 0: false, off: false }[text.toLowerCase()] ?? text;
-  }
-  if (tunable?.kind === "text") return text;
-  const value = Number(text);
-  return text.trim() !== "" && Number.isFinite(value) ? value : text;
 }

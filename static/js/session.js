@@ -10,12 +10,12 @@ const PATIENCE = 3000; // What takes longer is explained.
 const SILENCE = 8000; // A live stream speaks twice a second; after this it is taken for dead.
 
 export class Session extends EventTarget {
-  constructor(lab, frame, { params, seed }, view) {
+  constructor(lab, frame, { link, seed }, view) {
     super();
     this.lab = lab;
     this.frame = frame;
     this.view = view; // a function: what the scene should look like now
-    this.want = { params, seed, speed: 1, running: null, solver: null };
+    this.want = { params: {}, link, seed, speed: 1, running: null, solver: null };
     this.info = null;
     this.socket = null;
     this.tries = 0;
@@ -41,10 +41,10 @@ export class Session extends EventTarget {
     this.restore = news !== "" || this.want.running !== null;
     this.news = news;
     this.tell("phase", { phase: "worker", text: news });
-    const { params, seed } = this.want;
+    const { params, link, seed } = this.want;
     const waiting = setInterval(() => this.tellPreparing(), PATIENCE);
     const { status, data } = await request("POST", "/api/sessions", {
-      lab: this.lab.slug, params, seed, view: this.view(),
+      lab: this.lab.slug, params, link, seed, view: this.view(),
     });
     clearInterval(waiting);
     if (this.closed) return;
@@ -55,8 +55,8 @@ export class Session extends EventTarget {
     } else if (status === 0 || status >= 502) {
       this.tell("phase", { phase: "lost", text: "The server does not answer. Trying again …" });
       this.timer = setTimeout(() => this.create(this.news), this.delay());
-    } else if (status === 422 && Object.keys(params).length) {
-      this.want.params = {};
+    } else if (status === 422 && Object.keys({ ...params, ...link }).length) {
+      this.want = { ...this.want, params: {}, link: {} };
       this.tell("refused", data.error);
       this.create(news);
     } else {
@@ -126,7 +126,7 @@ export class Session extends EventTarget {
       for (const command of commands) this.send(command).catch(() => {});
     } else {
       const running = status.running || status.trouble !== "";
-      this.want = { params, seed, speed, running, solver: status.solver };
+      this.want = { params, link: {}, seed, speed, running, solver: status.solver };
     }
     this.tries = 0;
     this.told = true;

@@ -15,22 +15,25 @@ from labs.algorithms import ddp
 from labs.algorithms.ddp import Iterate, Options
 from labs.models.discrete import Discrete
 from labs.models.mechanisms import Mechanism, mechanism
-from labs.problems.optimal_control import Problem
-from labs.tasks.motion.cost import MotionCost, Reach
+from labs.models.plant import Plant
+from labs.problems.optimal_control import OptimalControlProblem
+from labs.tasks.motion.cost import MotionCost, TipCost
 
 PHASES = ("derivatives", "backward", "forward")
 ROUNDS = 60
 
 
-def reach(m: Mechanism, N: int, h: float = 0.01) -> tuple[Problem, np.ndarray]:
+def reach(m: Mechanism, N: int, h: float = 0.01) -> tuple[OptimalControlProblem, np.ndarray]:
     """An arm's tip to a point in N steps, and a first guess: gravity compensation."""
     n = m.nq
     q = np.resize(m.arm.home, n)
     holding, nothing = m.holding(q), np.zeros(2 * n)
     weights = [np.diag([x] * n + [y] * n) for x, y in ((0.0, 0.01 * h), (0.0, 10.0))]
-    goal = Reach(m, m.tip(q) + np.array([-0.1, 0.3, 0.1]), 1000.0)
+    goal = TipCost(m, m.tip(q) + np.array([-0.1, 0.3, 0.1]), 1000.0)
     cost = MotionCost(N, weights[0], 1e-4 * h * np.eye(n), weights[1], nothing, holding, goal)
-    return Problem(Discrete(m, h), cost, np.r_[q, np.zeros(n)], N), np.tile(holding, (N, 1))
+    return OptimalControlProblem(Discrete(m, h), cost, np.r_[q, np.zeros(n)], N), np.tile(
+        holding, (N, 1)
+    )
 
 
 def chain(joints: int) -> Mechanism:
@@ -48,10 +51,10 @@ def chain(joints: int) -> Mechanism:
     arm = mechanism("ur5").arm
     like = type(arm)("chain", "Chain", model, np.full(joints, 0.3), np.full(joints, 50.0), tip,
                      arm.visuals, arm.collisions, arm.camera)  # fmt: skip
-    return Mechanism("chain", like, model, model.createData(), tuple(range(joints)), 0.0)
+    return Mechanism("chain", Plant(like, model, model.createData()), tuple(range(joints)), 0.0)
 
 
-def iteration(problem: Problem, U: np.ndarray) -> tuple[dict[str, float], Iterate]:
+def iteration(problem: OptimalControlProblem, U: np.ndarray) -> tuple[dict[str, float], Iterate]:
     """Seconds of each phase, medians over the same first iteration, a full step."""
     options = Options()
     at = ddp.init(problem, U, options)

@@ -6,7 +6,7 @@ from time import perf_counter
 import numpy as np
 
 from labs.algorithms.riccati import prepare, solve
-from labs.optimal_control.lqr.comparison import HORIZONS, compare
+from labs.optimal_control.lqr.comparison import COMPARED_HORIZONS, compare
 from labs.problems.linear_quadratic import LqrProblem
 from labs.tasks.regulation.linear_systems import linear_system
 
@@ -38,7 +38,7 @@ def _over_horizons(name: str) -> None:
     n, m = b.shape
     print(f"{name}, n = {n}, m = {m}\n    N   Riccati [ms]   least squares [ms]   difference")
     rows = []
-    for horizon in HORIZONS[name]:
+    for horizon in COMPARED_HORIZONS[name]:
         problem = LqrProblem(horizon, a, b, np.eye(n), 0.1 * np.eye(m), np.eye(n))
         found = [compare(problem) for _ in range(11)]
         fast = 1e3 * min(c.riccati for c in found)

@@ -63,5 +63,5 @@ def _solve(world: World) -> int:
 def _on_the_wire(world: World) -> bytes:
     """The path of the plan's tip, as the scene sends it."""
     assert isinstance(world.state, DdpState)
-    path = world.state.history.tips[-1]
+    path = world.state.history.tip_paths[-1]
     return np.stack([path[:-1], path[1:]], axis=1).astype(np.float32).tobytes()

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
 from tests import chromium as chromium_browser
-from tests.served import Served
+from tests.served import PATIENCE, Served
 
 SCREENSHOTS = Path("screenshots")
 Visit = Callable[..., BrowserContext]
@@ -36,18 +36,24 @@ def chromium() -> Iterator[Browser]:
 
 @pytest.fixture
 def visit(chromium: Browser) -> Iterator[Visit]:
-    """Makes browser contexts; all are closed at the end, whatever happened."""
+    """Makes browser contexts whose pages must not complain: any script error, in a scene too,
+    fails the test. All are closed at the end, whatever happened."""
     opened: list[BrowserContext] = []
+    errors: list[str] = []
 
     def make(server: Served, **options: Any) -> BrowserContext:
         options = {"viewport": {"width": 1280, "height": 800}} | options
-        opened.append(chromium.new_context(base_url=server.address, **options))
-        return opened[-1]
+        context = chromium.new_context(base_url=server.address, **options)
+        context.set_default_timeout(1000 * PATIENCE)
+        context.on("weberror", lambda error: errors.append(str(error.error)))
+        opened.append(context)
+        return context
 
-    expect.set_options(timeout=15_000)
+    expect.set_options(timeout=1000 * PATIENCE)
     yield make
     for context in opened:
         context.close()
+    assert not errors
 
 
 @pytest.fixture
@@ -56,14 +62,8 @@ def context(visit: Visit, served: Served) -> BrowserContext:
 
 
 @pytest.fixture
-def page(context: BrowserContext) -> Iterator[Page]:
-    """A page that must not complain: any script error fails the test."""
-    page = context.new_page()
-    errors: list[str] = []
-    page.on("pageerror", lambda error: errors.append(str(error)))
-    yield page
-    page.close()
-    assert not errors
+def page(context: BrowserContext) -> Page:
+    return context.new_page()
 
 
 def screenshot(page: Page, name: str) -> None:

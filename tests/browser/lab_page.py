@@ -3,18 +3,41 @@
 import io
 import json
 import re
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from PIL import Image
-from playwright.sync_api import FrameLocator, Locator, Page, expect
+from playwright.sync_api import FrameLocator, Locator, Page, Route, WebSocket, expect
+
+SCENES = "**/scene/*/**"
+FRAMES = """count => new Promise(done => {
+  const next = () => (count-- > 0 ? requestAnimationFrame(next) : done());
+  next();
+})"""
+
+Message = dict[str, Any]
+
+
+def leave_out(route: Route) -> None:
+    """In place of a scene: drawing it in software is most of the work of a test."""
+    route.fulfill(body="<!doctype html>")
+
+
+def wait_frames(page: Page, count: int = 2) -> None:
+    """Waits until a page has been drawn again: twice, what was under way and what is."""
+    page.evaluate(FRAMES, count)
 
 
 class LabPage:
     """`lab = LabPage(page).open("joint-control", "?kp=500")`."""
 
-    def __init__(self, page: Page) -> None:
+    def __init__(self, page: Page, scene: bool = True) -> None:
+        """`scene=False` leaves the 3D scene out, where a test is about the page alone."""
         self.page = page
+        page.on("websocket", self._opened)
+        if not scene:
+            page.route(SCENES, leave_out)
 
     def open(self, slug: str, query: str = "") -> "LabPage":
         """Opens a lab and waits until it lives."""
@@ -23,11 +46,17 @@ class LabPage:
         return self
 
     def wait_live(self) -> None:
-        expect(self.page.locator("#curtain.open")).to_be_attached(timeout=20_000)
+        expect(self.page.locator("#curtain.open")).to_be_attached()
 
     @property
     def scene(self) -> FrameLocator:
         return self.page.frame_locator("#robot")
+
+    def load_scene(self) -> None:
+        """Loads the 3D scene that was left out."""
+        frame = next(frame for frame in self.page.frames if "/scene/" in frame.url)
+        self.page.unroute(SCENES)
+        frame.goto(frame.url)
 
     def row(self, label: str) -> Locator:
         """The row of the panel with this label: Viser associates no label with its slider."""
@@ -42,16 +71,38 @@ class LabPage:
         """The value of a parameter in the article's table."""
         return self.page.locator(f"#value-{name}")
 
-    def status(self) -> dict[str, Any]:
+    def status(self) -> Message:
         """The session as the API tells it."""
-        addresses = " ".join(frame.url for frame in self.page.frames)
-        found = re.search(r"/scene/([^/]+)/", addresses)
+        found = re.search(r"/api/sessions/[^/]+", self._stream.url)
         assert found
-        answer = self.page.request.get(f"/api/sessions/{found[1]}")
-        status: dict[str, Any] = json.loads(answer.text())
+        status: Message = json.loads(self.page.request.get(found[0]).text())
         return status
+
+    def told(
+        self, type: str = "status", when: Callable[[Message], bool] = lambda m: True
+    ) -> Message:
+        """The next message of a type that the page is told, and that fulfils a condition."""
+
+        def wanted(frame: str | bytes) -> bool:
+            message = json.loads(frame)
+            return message["type"] == type and when(message)
+
+        return dict(json.loads(self._stream.wait_for_event("framereceived", wanted)))
 
     def pixels(self, selector: str) -> np.ndarray:
         """What a part of the page shows, (height, width, 3)."""
         data = self.page.locator(selector).screenshot()
         return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"), dtype=int)
+
+    def pixels_when(self, selector: str, true: Callable[[np.ndarray], bool]) -> np.ndarray:
+        """What a part of the page shows as soon as it fulfils a condition."""
+        for _ in range(200):
+            image = self.pixels(selector)
+            if true(image):
+                return image
+            wait_frames(self.page)
+        raise AssertionError("it never looked so")
+
+    def _opened(self, socket: WebSocket) -> None:
+        if socket.url.endswith("/stream"):
+            self._stream = socket

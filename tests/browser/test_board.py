@@ -18,9 +18,19 @@ def middle(page: Page) -> tuple[float, float]:
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
 
+def colored(image: np.ndarray) -> float:
+    """The part of a picture that is neither white nor grey nor black."""
+    return float((np.ptp(image, axis=2) > 30).mean())
+
+
+def is_drawn(image: np.ndarray) -> bool:
+    """Whether the board and the surface over it are there; a floor alone has no colours."""
+    return colored(image) > 0.05
+
+
 def test_a_click_on_a_cell_changes_the_map(page: Page) -> None:
     lab = LabPage(page).open("board")
-    page.wait_for_timeout(3000)  # software rendering takes its time to draw the first board
+    lab.pixels_when("#robot", is_drawn)
     before = lab.status()["params"]["map"].split("\n")
     assert before[2][4] == "#"
     page.mouse.click(*middle(page))
@@ -36,20 +46,19 @@ def test_a_click_on_a_cell_changes_the_map(page: Page) -> None:
 
 def test_a_board_waves_and_a_surface_over_it(page: Page) -> None:
     lab = LabPage(page).open("board", "?rate=5")
-    page.wait_for_timeout(3000)
-    seen = [lab.pixels("#robot")]
+    seen = [lab.pixels_when("#robot", is_drawn)]
     for _ in range(8):
-        page.wait_for_timeout(250)
+        lab.told("telemetry", when=lambda m: m["rows"] != [])
         seen.append(lab.pixels("#robot"))
-    assert max(np.abs(now - seen[0]).max() for now in seen[1:]) > 60, "the colours move"
-    colored = [(np.ptp(image, axis=2) > 30).mean() for image in seen]
-    assert min(colored) > 0.7 * max(colored), "the surface never blinks while it is replaced"
+    lab.pixels_when("#robot", lambda now: np.abs(now - seen[0]).max() > 60)  # the colours move
+    parts = [colored(image) for image in seen]
+    assert min(parts) > 0.7 * max(parts), "the surface never blinks while it is replaced"
 
 
 def test_a_long_text_is_a_link(page: Page) -> None:
     """3999 characters: about as many as a text may have."""
     rows = "\n".join(["." * 39] * 99 + ["#" * 39])
-    lab = LabPage(page).open("board")
+    lab = LabPage(page, scene=False).open("board")
     lab.value("map").fill(rows)
     lab.value("map").blur()
     expect(page).to_have_url(re.compile("map=.{3999}"))

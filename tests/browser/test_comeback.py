@@ -15,7 +15,7 @@ def test_a_killed_worker_comes_back_with_the_same_parameters(page: Page, served:
     until(lambda: served.health()["spares"] == 1 and served.health()["sessions"] == 0)
     (worker,) = served.listeners()
     lab = LabPage(page).open("joint-control", "?kp=640&controller=pid")
-    page.wait_for_timeout(1500)
+    expect(lab.scene.locator("canvas").first).to_be_visible()
     os.kill(worker, signal.SIGKILL)
     expect(page.locator("body")).to_contain_text("SIGKILL")
     lab.wait_live()
@@ -30,49 +30,45 @@ def test_a_killed_worker_comes_back_with_the_same_parameters(page: Page, served:
     expect(lab.value("kp")).to_have_value("650")
 
 
-def test_a_restarted_server_is_found_again(visit: Visit) -> None:
-    with Served() as server:
-        context = visit(server)
-        lab = LabPage(context.new_page()).open("joint-control", "?kp=512")
-        old = lab.status()["id"]
-        server.stop()
-        expect(lab.page.locator("body")).to_contain_text(re.compile("lost|does not answer"))
-        screenshot(lab.page, "lost")
-        server.start()
-        lab.wait_live()
-        expect(lab.page.locator("body")).to_contain_text("your parameters")
-        expect(lab.value("kp")).to_have_value("512")
-        assert lab.status()["id"] != old
+def test_a_restarted_server_is_found_again(visit: Visit, mortal: Served) -> None:
+    lab = LabPage(visit(mortal).new_page()).open("joint-control", "?kp=512")
+    old = lab.status()["id"]
+    mortal.stop()
+    expect(lab.page.locator("body")).to_contain_text(re.compile("lost|does not answer"))
+    screenshot(lab.page, "lost")
+    mortal.start()
+    lab.wait_live()
+    expect(lab.page.locator("body")).to_contain_text("your parameters")
+    expect(lab.value("kp")).to_have_value("512")
+    assert lab.status()["id"] != old
 
 
-def test_a_full_house_says_so_and_lets_in_when_there_is_room(visit: Visit) -> None:
-    with Served(ORCLAB_MAX_SESSIONS="1") as server:
-        context = visit(server)
-        with server.session("oscillator"):
-            page = context.new_page()
-            page.goto("/labs/joint-control")
-            expect(page.locator("body")).to_contain_text("all 1 places are taken")
-            screenshot(page, "full")
-        page.locator("#banner button").first.click()
-        LabPage(page).wait_live()
+def test_a_full_house_says_so_and_lets_in_when_there_is_room(visit: Visit, small: Served) -> None:
+    page = visit(small).new_page()
+    with small.session("oscillator"):
+        page.goto("/labs/joint-control")
+        expect(page.locator("body")).to_contain_text("all 1 places are taken")
+        screenshot(page, "full")
+    page.locator("#banner button").first.click()
+    LabPage(page).wait_live()
 
 
-def test_an_idle_session_rests_until_it_is_wanted(visit: Visit) -> None:
-    with Served(ORCLAB_UNTOUCHED_SECONDS="4") as server:
-        context = visit(server)
-        lab = LabPage(context.new_page()).open("joint-control", "?kp=512")
-        expect(lab.page.locator("#banner")).to_contain_text("same parameters")
-        until(lambda: server.health()["sessions"] == 0)
-        lab.page.wait_for_timeout(1000)
-        assert server.health()["sessions"] == 0, "it rests"
-        lab.page.locator("#banner button").first.click()
-        lab.wait_live()
-        expect(lab.value("kp")).to_have_value("512")
+def test_an_idle_session_rests_until_it_is_wanted(visit: Visit, impatient: Served) -> None:
+    page = visit(impatient).new_page()
+    page.clock.install()
+    lab = LabPage(page, scene=False).open("joint-control", "?kp=512")
+    expect(page.locator("#banner")).to_contain_text("same parameters")
+    until(lambda: impatient.health()["sessions"] == 0)
+    page.clock.run_for(30_000)  # longer than any timer of the page
+    assert impatient.health()["sessions"] == 0, "it rests"
+    page.locator("#banner button").first.click()
+    lab.wait_live()
+    expect(lab.value("kp")).to_have_value("512")
 
 
 def test_a_closed_page_frees_its_place(page: Page, served: Served) -> None:
     until(lambda: served.health()["sessions"] == 0)
-    LabPage(page).open("joint-control")
+    LabPage(page, scene=False).open("joint-control")
     assert served.health()["sessions"] == 1
     page.goto("about:blank")
     until(lambda: served.health()["sessions"] == 0)

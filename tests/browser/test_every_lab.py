@@ -1,38 +1,34 @@
-"""Every lab of the course opens in a browser, and every experiment of its article works."""
+"""Every lab of the course opens in a browser, every experiment of its article and a slider work."""
 
 import re
 
 import pytest
 from playwright.sync_api import Page, expect
 
-from labs.engine.catalog import catalog
+from labs.engine.catalog import Entry, catalog
 from server.articles import render
 from tests.browser.conftest import screenshot
-from tests.browser.lab_page import LabPage
+from tests.browser.lab_page import LabPage, wait_frames
 
-SHIPPED = [slug for slug, entry in catalog().items() if entry.package.startswith("labs.")]
+SHIPPED = [entry for entry in catalog().values() if entry.package.startswith("labs.")]
 
 
-@pytest.mark.parametrize("slug", SHIPPED)
-def test_every_experiment_sets_what_it_says(page: Page, slug: str) -> None:
-    entry = catalog()[slug]
+@pytest.mark.parametrize("entry", SHIPPED, ids=lambda entry: entry.slug)
+def test_every_experiment_and_a_slider_set_what_they_say(page: Page, entry: Entry) -> None:
     # Pressing is the page's own; drawing every scene in software would take minutes.
-    page.route("**/scene/*/**", lambda route: route.fulfill(body="<!doctype html>"))
-    lab = LabPage(page).open(slug)
+    lab = LabPage(page, scene=False).open(entry.slug)
     for number, experiment in enumerate(render(entry).experiments):
         page.locator(".experiment .try").nth(number).click()
         expect(page.locator(".experiment").nth(number)).to_have_class(re.compile("current"))
         wanted = entry.lab.Params().change(experiment.settings).model_dump()
         assert lab.status()["params"] == wanted, experiment.title
         expect(page.locator("#banner")).not_to_contain_text("defect of the lab")
-
-
-@pytest.mark.parametrize("slug", SHIPPED)
-def test_a_slider_of_every_lab_moves_its_parameter(page: Page, slug: str) -> None:
-    lab = LabPage(page).open(slug)
+    page.keyboard.press("d")
+    lab.told(when=lambda s: s["params"] == entry.lab.Params().model_dump())
+    lab.load_scene()
     knob = next(
         tunable
-        for tunable in catalog()[slug].lab.Params.describe()
+        for tunable in entry.lab.Params.describe()
         if tunable["kind"] == "knob" and tunable["scale"] == "linear"
     )
     unit = f" [{knob['unit']}]" if knob["unit"] else ""
@@ -42,6 +38,9 @@ def test_a_slider_of_every_lab_moves_its_parameter(page: Page, slug: str) -> Non
     box.fill(f"{value:.2f}")
     box.press("Enter")
     expect(lab.value(knob["name"])).to_have_value(f"{float(f'{value:.2f}'):g}")
-    page.wait_for_timeout(3000)
-    screenshot(page, f"lab-{slug}")
+    for _ in range(3):
+        lab.told()
+    expect(lab.scene.locator("canvas").first).to_be_visible()
+    wait_frames(page)
+    screenshot(page, f"lab-{entry.slug}")
     expect(page.locator("#banner")).not_to_contain_text("defect of the lab")

@@ -1,34 +1,36 @@
 """The pages from a telephone to a wall, in light and in dark."""
 
 import re
+from itertools import product
+from typing import Literal
 
 import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.conftest import Visit, screenshot
-from tests.browser.lab_page import LabPage
+from tests.browser.lab_page import SCENES, LabPage, leave_out, wait_frames
 from tests.served import Served
 
 SIZES = {"phone": (360, 740), "tablet": (820, 1180), "laptop": (1366, 768), "wall": (3840, 2160)}
+SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("path", ["/", "/labs/joint-control"])
-def test_nothing_overflows(visit: Visit, served: Served, path: str, size: str, scheme: str) -> None:
-    width, height = SIZES[size]
-    context = visit(served, viewport={"width": width, "height": height}, color_scheme=scheme)
-    page = context.new_page()
+def test_nothing_overflows(page: Page, path: str) -> None:
     # The layout is the page's own; drawing the scene 4K wide in software would take minutes.
-    page.route("**/scene/*/**", lambda route: route.fulfill(body="<!doctype html>"))
+    lab = LabPage(page, scene=False)
     page.goto(path)
     if path != "/":
-        LabPage(page).wait_live()
-    page.wait_for_timeout(500)
-    screenshot(page, f"{'home' if path == '/' else 'lab'}-{size}-{scheme}")
-    overflow = page.evaluate("document.documentElement.scrollWidth - innerWidth")
-    assert overflow <= 0
-    assert (lightness(page) < 200) if scheme == "dark" else (lightness(page) > 600)
+        lab.wait_live()
+    for size, scheme in product(SIZES, SCHEMES):
+        width, height = SIZES[size]
+        page.set_viewport_size({"width": width, "height": height})
+        page.emulate_media(color_scheme=scheme)
+        wait_frames(page)
+        screenshot(page, f"{'home' if path == '/' else 'lab'}-{size}-{scheme}")
+        overflow = page.evaluate("document.documentElement.scrollWidth - innerWidth")
+        assert overflow <= 0, (size, scheme)
+        assert (lightness(page) < 200) if scheme == "dark" else (lightness(page) > 600)
 
 
 def lightness(page: Page) -> int:
@@ -39,6 +41,7 @@ def lightness(page: Page) -> int:
 
 def test_the_article_reads_before_anything_is_pressed(page: Page) -> None:
     """Mathematics is text set in the mathematics font, and there without scripts."""
+    page.route(SCENES, leave_out)
     page.goto("/labs/joint-control")
     formula = page.locator("article math").first
     expect(formula).to_be_visible()
@@ -62,13 +65,14 @@ def test_nothing_jumps_while_the_lab_starts(page: Page) -> None:
             for (const e of list.getEntries()) window.shift += e.value;
         }).observe({type: 'layout-shift', buffered: true}); }"""
     )
-    LabPage(page).wait_live()
-    page.wait_for_timeout(2000)
+    expect(page.locator("#curtain.open")).to_be_attached()
+    page.wait_for_load_state("networkidle")  # all has come: scene, curves, fonts
+    wait_frames(page)
     assert page.evaluate("window.shift") < 0.02
 
 
 def test_the_theme_is_switched_and_kept(page: Page) -> None:
-    lab = LabPage(page).open("joint-control")
+    lab = LabPage(page, scene=False).open("joint-control")
     page.get_by_role("button", name="Appearance").click()
     page.check("#view-menu input[value=dark]")
     assert lightness(page) < 200
@@ -81,8 +85,11 @@ def test_no_address_outside_is_asked(visit: Visit, served: Served) -> None:
     page = visit(served).new_page()
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
-    LabPage(page).open("oscillator")
-    page.wait_for_timeout(2000)
+    lab = LabPage(page).open("oscillator")
+    page.get_by_role("region", name="Field").scroll_into_view_if_needed()
+    expect(page.locator("#plots .js-plotly-plot")).to_be_visible()
+    expect(lab.scene.locator("canvas").first).to_be_visible()
+    page.wait_for_load_state("networkidle")
     foreign = [
         url for url in asked if not url.startswith((served.address, "data:", "blob:", "ws://127."))
     ]

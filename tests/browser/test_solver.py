@@ -1,16 +1,19 @@
 """The solver's row of a lab's page: run, step, look back, pace, save and load."""
 
 import re
+from itertools import product
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.conftest import Visit, screenshot
-from tests.browser.lab_page import LabPage
+from tests.browser.lab_page import LabPage, wait_frames
+from tests.browser.test_layout import SCHEMES
 from tests.served import Served
 
 DONE = re.compile("steps done")
+WIDTHS = (360, 820, 1100, 1500)
 
 
 def iteration(page: Page) -> int:
@@ -40,7 +43,7 @@ def test_it_runs_is_held_and_goes_step_by_step(page: Page) -> None:
 
 
 def test_a_pace_shows_progress_and_the_time_left(page: Page) -> None:
-    LabPage(page).open("descent")
+    LabPage(page, scene=False).open("descent")
     page.select_option("#solver-pace", "30")
     page.locator("h1").click()
     page.keyboard.press("r")
@@ -52,7 +55,7 @@ def test_a_pace_shows_progress_and_the_time_left(page: Page) -> None:
 
 
 def test_dragging_back_shows_what_was_and_its_end_the_latest(page: Page) -> None:
-    LabPage(page).open("descent")
+    LabPage(page, scene=False).open("descent")
     expect(page.locator("#iterations")).to_have_text("200")
     slider = page.locator("#iteration")
     box = slider.bounding_box()
@@ -62,7 +65,7 @@ def test_dragging_back_shows_what_was_and_its_end_the_latest(page: Page) -> None
     page.mouse.down()
     for part in (0.8, 0.6, 0.4):
         page.mouse.move(box["x"] + part * box["width"], y)
-        page.wait_for_timeout(100)
+        wait_frames(page)
     page.mouse.up()
     expect(page.locator("#iterations")).to_have_text(re.compile(r"^[6-9]\d of 200$"))
     expect(page.locator("#solver-says")).to_have_text("Looking back")
@@ -78,7 +81,7 @@ def test_dragging_back_shows_what_was_and_its_end_the_latest(page: Page) -> None
 
 @pytest.mark.parametrize("form", ["npz", "json"])
 def test_a_solution_is_taken_home_and_brought_back(page: Page, tmp_path: Path, form: str) -> None:
-    lab = LabPage(page).open("descent", "?rate=0.03&many=40")
+    lab = LabPage(page, scene=False).open("descent", "?rate=0.03&many=40")
     expect(page.locator("#iterations")).to_have_text("40")
     page.get_by_role("button", name="Solution").click()
     with page.expect_download() as download:
@@ -100,7 +103,7 @@ def test_a_solution_is_taken_home_and_brought_back(page: Page, tmp_path: Path, f
 
 
 def test_a_wrong_file_is_refused_in_a_sentence(page: Page, tmp_path: Path) -> None:
-    LabPage(page).open("descent")
+    LabPage(page, scene=False).open("descent")
     expect(page.locator("#iterations")).to_have_text("200")
     (tmp_path / "wrong.json").write_text("[]")
     page.set_input_files("#solution-file", tmp_path / "wrong.json")
@@ -111,44 +114,45 @@ def test_a_wrong_file_is_refused_in_a_sentence(page: Page, tmp_path: Path) -> No
 
 
 def test_a_lab_without_a_solver_has_no_such_row(page: Page) -> None:
-    LabPage(page).open("troublesome")
+    LabPage(page, scene=False).open("troublesome")
     expect(page.locator("#solver")).to_have_count(0)
     page.keyboard.press("o")
     page.keyboard.press("i")
     expect(page.locator("#toasts")).to_be_empty()
 
 
-@pytest.mark.parametrize("width", [360, 820, 1100, 1500])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_nothing_overflows_and_nothing_jumps(
-    visit: Visit, served: Served, width: int, scheme: str
-) -> None:
-    context = visit(served, viewport={"width": width, "height": 800}, color_scheme=scheme)
-    page = context.new_page()
-    page.route("**/scene/*/**", lambda route: route.fulfill(body="<!doctype html>"))
-    LabPage(page).open("descent")
-    row = page.locator("#solver")
-    expect(page.locator("#solver-says")).to_have_text(DONE)
-    heights = [row.evaluate("row => row.offsetHeight")]
-    page.select_option("#solver-pace", "30")
-    page.get_by_role("button", name="Start again").click()
-    expect(page.locator("#solver-says")).to_have_text(re.compile("left"))
-    heights.append(row.evaluate("row => row.offsetHeight"))
-    page.locator("#iteration").press("Home")
-    expect(page.locator("#solver-says")).to_have_text("Looking back")
-    heights.append(row.evaluate("row => row.offsetHeight"))
-    screenshot(page, f"solver-{width}-{scheme}")
-    assert len(set(heights)) == 1, heights
-    assert page.evaluate("document.documentElement.scrollWidth - innerWidth") <= 0
+def test_nothing_overflows_and_nothing_jumps(page: Page) -> None:
+    LabPage(page, scene=False).open("descent")
+    row, says = page.locator("#solver"), page.locator("#solver-says")
+    for width, scheme in product(WIDTHS, SCHEMES):
+        page.set_viewport_size({"width": width, "height": 800})
+        page.emulate_media(color_scheme=scheme)
+        expect(says).to_have_text(DONE)
+        heights = [row.evaluate("row => row.offsetHeight")]
+        page.select_option("#solver-pace", "30")
+        page.get_by_role("button", name="Start again").click()
+        expect(says).to_have_text(re.compile("left"))
+        heights.append(row.evaluate("row => row.offsetHeight"))
+        page.locator("#iteration").press("Home")
+        expect(says).to_have_text("Looking back")
+        heights.append(row.evaluate("row => row.offsetHeight"))
+        screenshot(page, f"solver-{width}-{scheme}")
+        assert len(set(heights)) == 1, (width, scheme, heights)
+        assert page.evaluate("document.documentElement.scrollWidth - innerWidth") <= 0
+        page.select_option("#solver-pace", "0")
+        page.get_by_role("button", name="Run the solver").click()
 
 
-def test_a_page_opened_at_the_first_start_says_what_goes_on(visit: Visit) -> None:
-    with Served(wait=False, PREPARE_SECONDS="8") as server:
+def test_a_page_opened_at_the_first_start_says_what_goes_on(visit: Visit, tmp_path: Path) -> None:
+    prepared = tmp_path / "prepared"
+    with Served(wait=False, PREPARED_BY=str(prepared)) as server:
         page = visit(server).new_page()
+        LabPage(page, scene=False)
         page.goto("/labs/descent")
         expect(page.locator("#curtain")).to_contain_text(
             "The first start compiles the solvers, once"
         )
         expect(page.locator("#curtain .once")).to_be_visible()
         screenshot(page, "first-start")
-        expect(page.locator("#curtain.open")).to_be_attached(timeout=120_000)
+        prepared.touch()
+        expect(page.locator("#curtain.open")).to_be_attached()

@@ -135,9 +135,9 @@ def test_a_colour_is_sent_linear_and_darker_where_the_light_is_brighter() -> Non
     """sRGB 0.5 is 0.2140 of full light."""
     points, _ = hills(2, 2)
     grey = np.full((2, 2, 3), 0.5)
-    for shine in (1.0, 2.0):
-        sent = np.frombuffer(glb(points, grey, shine)[-12 - 32 : -12], "<u2").reshape(4, 4)
-        np.testing.assert_allclose(sent[:, :3] / 65535, 0.2140 / shine, atol=1e-4)
+    for exposure in (1.0, 2.0):
+        sent = np.frombuffer(glb(points, grey, exposure)[-12 - 32 : -12], "<u2").reshape(4, 4)
+        np.testing.assert_allclose(sent[:, :3] / 65535, 0.2140 / exposure, atol=1e-4)
         assert (sent[:, 3] == 65535).all(), "opaque"
 
 
@@ -154,7 +154,7 @@ def test_a_surface_is_replaced_only_once_the_new_one_is_there(
     node.draw(points, colors)
     assert node._shown is first, "nothing changed"
     node.draw(points + 1.0, colors)
-    assert second.glb_data == glb(points + 1.0, colors, boards.shine(LOW))
+    assert second.glb_data == glb(points + 1.0, colors, boards.exposure(LOW))
     assert (first.visible, second.visible) == (True, False)
     now += 0.05
     node.draw(points + 2.0, colors)
@@ -164,7 +164,7 @@ def test_a_surface_is_replaced_only_once_the_new_one_is_there(
     assert (first.visible, second.visible) == (False, True)
     now += 0.1
     node.draw(points + 2.0, colors)
-    assert first.glb_data == glb(points + 2.0, colors, boards.shine(LOW))
+    assert first.glb_data == glb(points + 2.0, colors, boards.exposure(LOW))
     assert (first.visible, second.visible) == (False, True)
 
 

@@ -11,7 +11,7 @@ from websockets.sync.client import connect
 
 from server.mailbox import Mailbox
 from server.messages import View
-from server.nodes import COLORS, DARK, LIGHT, paler
+from server.nodes import COLORS, DARK, LIGHT, blend_with_background
 from server.viser_scene import ViserScene
 from tests.served import Served
 from tests.viser_client import PROTOCOL, SceneClient, message
@@ -130,7 +130,9 @@ def test_a_dragged_handle_reaches_the_world(served: Served) -> None:
 
 @pytest.mark.parametrize("dark", [False, True])
 def test_a_weaker_trail_is_nearer_to_what_is_behind_it(dark: bool) -> None:
-    full, half, faint = (paler("actual", s, dark).astype(int) for s in (1.0, 0.5, 0.1))
+    full, half, faint = (
+        blend_with_background("actual", s, dark).astype(int) for s in (1.0, 0.5, 0.1)
+    )
     behind = np.array(DARK if dark else LIGHT)
     assert full.tolist() == list(COLORS["actual"])
     distances = [np.linalg.norm(color - behind) for color in (full, half, faint)]
@@ -147,7 +149,7 @@ def test_a_trail_fades_without_being_made_anew() -> None:
         for strength in (1.0, 0.3):
             scene.trail("echo", points, strength=strength)
             shown = node._handle.colors
-            assert shown.tolist() == paler("actual", strength, dark=True).tolist()
+            assert shown.tolist() == blend_with_background("actual", strength, dark=True).tolist()
         assert scene._nodes["echo"] is node
     finally:
         server.stop()

@@ -56,7 +56,7 @@ def replayed(about: dict[str, Any]) -> World:
 def test_a_pace_lets_through_as_many_as_are_due() -> None:
     world = World(find("descent"))
     clock = SolverClock(world, None)
-    clock.obey("pace", pace=10.0)
+    clock.dispatch("pace", pace=10.0)
     done = []
     for frame in range(60):
         now = 100.0 + frame / 60
@@ -69,7 +69,7 @@ def test_a_pace_lets_through_as_many_as_are_due() -> None:
 def test_time_left_is_told_from_progress_and_its_own_time() -> None:
     world = World(find("descent"))
     clock = SolverClock(world, None)
-    clock.obey("pace", pace=10.0)
+    clock.dispatch("pace", pace=10.0)
     for frame in range(601):
         clock.iterate(100.0 + frame / 60, until=float("inf"))
     status = clock.status()
@@ -77,7 +77,7 @@ def test_time_left_is_told_from_progress_and_its_own_time() -> None:
     assert status.progress == status.latest / 200
     expected = 10.0 * (200 - status.latest) / status.latest
     assert status.seconds_left == pytest.approx(expected, rel=0.02)
-    clock.obey("pause")
+    clock.dispatch("pause")
     for frame in range(600):
         clock.iterate(200.0 + frame / 60, until=float("inf"))
     after = clock.status()
@@ -88,11 +88,11 @@ def test_time_left_is_told_from_progress_and_its_own_time() -> None:
 def test_steps_that_are_owed_end_with_their_solver() -> None:
     world = World(find("descent"))
     clock = SolverClock(world, {"running": False, "pace": 0.0})
-    clock.obey("step", count=5)
+    clock.dispatch("step", count=5)
     world.change({"rate": 0.01})
     clock.iterate(1.0, until=float("inf"))
     assert world.latest is None
-    clock.obey("step", count=3)
+    clock.dispatch("step", count=3)
     clock.iterate(1.0, until=float("inf"))
     assert world.kept.iterations == [1, 2, 3]
 
@@ -100,20 +100,20 @@ def test_steps_that_are_owed_end_with_their_solver() -> None:
 def test_an_iteration_in_pieces_is_one_iteration() -> None:
     world = World(find("descent"))
     clock = SolverClock(world, {"running": False, "pace": 0.0})
-    clock.obey("step", count=2)
+    clock.dispatch("step", count=2)
     found = []
     for _ in range(6):
         clock.iterate(1.0, until=0.0)  # a piece at a time
         found.append(world.latest.iteration if world.latest else 0)
     assert found == [0, 1, 1, 2, 2, 2]
-    clock.obey("run")
+    clock.dispatch("run")
     clock.iterate(1.0, until=0.0)
-    clock.obey("show", iteration=1)
+    clock.dispatch("show", iteration=1)
     for _ in range(3):
         clock.iterate(1.0, until=0.0)
     assert world.shown is world.kept.at(1), "what is looked at stays, in the midst of another"
-    clock.obey("pace", pace=1.0)
-    clock.obey("run")
+    clock.dispatch("pace", pace=1.0)
+    clock.dispatch("run")
     for _ in range(9):
         clock.iterate(2.0, until=0.0)
     assert world.latest is not None

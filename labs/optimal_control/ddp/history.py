@@ -7,41 +7,41 @@ import numpy as np
 
 from labs.algorithms.ddp import Iterate
 
-KEPT, POINTS = 10, 60
+KEPT_PATHS, PATH_POINTS = 10, 60
 """Iterations whose paths are kept, and points of each."""
 
 
 @dataclass(frozen=True)
 class History:
-    """Numbers of all iterations, and the paths of the last KEPT, the newest last. Arrays are
+    """Numbers of all iterations, and the paths of the last KEPT_PATHS, the newest last. Arrays are
     never written into again."""
 
     cost: np.ndarray
     """(k + 1,) from the first guess on."""
     expected: np.ndarray
-    """(k,) change of the cost, as all that follow up to the paths."""
+    """(k,) change of the cost, like all that follow up to the paths."""
     actual: np.ndarray
     alpha: np.ndarray
     mu: np.ndarray
     gradient: np.ndarray
-    tips: np.ndarray
-    """(KEPT, POINTS, 3) [m] of a robot's tip."""
-    phases: np.ndarray
-    """(KEPT, POINTS, 2) angle [rad] and velocity [rad/s] of a joint."""
+    tip_paths: np.ndarray
+    """(KEPT_PATHS, PATH_POINTS, 3) [m] of a robot's tip."""
+    phase_paths: np.ndarray
+    """(KEPT_PATHS, PATH_POINTS, 2) angle [rad] and velocity [rad/s] of a joint."""
 
     @classmethod
-    def begun(cls, at: Iterate, tip: np.ndarray, phase: np.ndarray, before: Self | None) -> Self:
-        """Of a first guess, with its paths (POINTS, 3) and (POINTS, 2). Of what was solved
-        `before`, the last paths stay in view."""
+    def start(cls, at: Iterate, tip: np.ndarray, phase: np.ndarray, before: Self | None) -> Self:
+        """Of a first guess, with its paths (PATH_POINTS, 3) and (PATH_POINTS, 2). The last paths
+        of what was solved `before` stay in view."""
         none = np.zeros(0)
-        last = (before.tips[-1], before.phases[-1]) if before else (tip, phase)
-        rows = [np.tile(path, (KEPT, 1, 1)) for path in last]
+        last = (before.tip_paths[-1], before.phase_paths[-1]) if before else (tip, phase)
+        rows = [np.tile(path, (KEPT_PATHS, 1, 1)) for path in last]
         cost = np.array([at.cost])
         return cls(
-            cost, none, none, none, none, none, _newest(rows[0], tip), _newest(rows[1], phase)
+            cost, none, none, none, none, none, _shift_in(rows[0], tip), _shift_in(rows[1], phase)
         )
 
-    def after(self, at: Iterate, tip: np.ndarray, phase: np.ndarray) -> Self:
+    def append(self, at: Iterate, tip: np.ndarray, phase: np.ndarray) -> Self:
         """One iteration later."""
         return type(self)(
             np.append(self.cost, at.cost),
@@ -50,16 +50,16 @@ class History:
             np.append(self.alpha, at.alpha),
             np.append(self.mu, at.mu),
             np.append(self.gradient, at.gradient),
-            _newest(self.tips, tip),
-            _newest(self.phases, phase),
+            _shift_in(self.tip_paths, tip),
+            _shift_in(self.phase_paths, phase),
         )
 
 
-def spread(rows: np.ndarray) -> np.ndarray:
-    """POINTS of the rows, evenly from the first to the last."""
-    return np.asarray(rows[np.linspace(0, len(rows) - 1, POINTS).round().astype(int)])
+def thin_out(rows: np.ndarray) -> np.ndarray:
+    """PATH_POINTS of the rows, evenly from the first to the last."""
+    return np.asarray(rows[np.linspace(0, len(rows) - 1, PATH_POINTS).round().astype(int)])
 
 
-def _newest(rows: np.ndarray, newest: np.ndarray) -> np.ndarray:
+def _shift_in(rows: np.ndarray, newest: np.ndarray) -> np.ndarray:
     """The rows moved up by one, the newest last."""
     return np.concatenate([rows[1:], newest[None]])

@@ -10,18 +10,18 @@ from labs.algorithms.least_squares_lqr import solve_at_once
 from labs.algorithms.riccati import solve
 from labs.problems.linear_quadratic import LqrProblem
 
-COUNT = 7
-"""Horizons tried."""
 _FEW, _MANY = (4, 6, 9, 14, 22, 34, 50), (10, 20, 40, 80, 130, 190, 260)
-HORIZONS: Mapping[str, tuple[int, ...]] = {
+COMPARED_HORIZONS: Mapping[str, tuple[int, ...]] = {
     "cart-pole": _MANY,
     "pendulum": _MANY,
     "mass": _MANY,
     "ur5": _FEW,
 }
 """N of each system, as far as least squares takes a few hundredths of a second."""
-FIRST = 0.1
-"""[m, rad, m/s, rad/s] every component of the x_0 they start from."""
+HORIZON_COUNT = 7
+"""How many of each system."""
+DEVIATION = 0.1
+"""[m, rad, m/s, rad/s] every component of the dx_0 they start from."""
 
 
 @dataclass(frozen=True)
@@ -38,12 +38,12 @@ class Comparison:
 
 def compare(problem: LqrProblem) -> Comparison:
     """Solves the problem both ways."""
-    x0 = np.full(problem.n, FIRST)
+    x0 = np.full(problem.n, DEVIATION)
     begin = thread_time()
-    _, by_riccati = problem.follow(solve(problem), x0)
+    _, riccati = problem.follow(solve(problem), x0)
     middle = thread_time()
-    at_once = solve_at_once(problem, x0)
+    least_squares = solve_at_once(problem, x0)
     end = thread_time()
-    largest = float(np.abs(at_once).max()) or 1.0
-    difference = float(np.abs(by_riccati - at_once).max()) / largest
+    largest = float(np.abs(least_squares).max()) or 1.0
+    difference = float(np.abs(riccati - least_squares).max()) / largest
     return Comparison(difference, middle - begin, end - middle)

@@ -19,21 +19,21 @@ from labs.errors import LabError
 from labs.problems.linear_quadratic import LqrPolicy, LqrProblem
 from labs.tasks.regulation.linear_systems import LinearSystem, linear_system
 
-MOST = 20_000
-"""Steps of the recursion towards the steady state."""
-SETTLED = 0.01
+MAX_RECURSIONS = 20_000
+"""Steps of the recursion towards the steady state, at most."""
+SETTLING_BAND = 0.01
 """Within this share of its steady value an element counts as constant."""
 
-POLICIES = {
+LQR_POLICIES = {
     "steady": "Steady state",
     "window": "Horizon, then over again",
     "receding": "Receding horizon",
 }
-FINALS = {"q": "α Q", "p": "α P of the steady state"}
+FINAL_WEIGHTS = {"q": "α Q", "p": "α P of the steady state"}
 
 
 @dataclass(frozen=True)
-class Setting:
+class RegulatorSettings:
     """What fixes a regulator. `weights` are Q's diagonal: of what slides [1/m^2], of what turns
     [1/rad^2], and of their rates [s^2/m^2, s^2/rad^2]; R = r I."""
 
@@ -44,17 +44,17 @@ class Setting:
     r: float
     horizon: int
     final: str
-    """One of FINALS, what Q_f is a multiple of."""
+    """One of FINAL_WEIGHTS, what Q_f is a multiple of."""
     alpha: float
     policy: str
-    """One of POLICIES."""
+    """One of LQR_POLICIES."""
 
 
 @dataclass(frozen=True, eq=False)
 class Regulator:
     """The policy and what is known of it. What cannot be is no error here but `trouble`."""
 
-    setting: Setting
+    settings: RegulatorSettings
     problem: LqrProblem
     optimal: LqrPolicy | None
     """Over the horizon; None where there is none."""
@@ -65,20 +65,20 @@ class Regulator:
 
     @property
     def system(self) -> LinearSystem:
-        return linear_system(self.setting.system)
+        return linear_system(self.settings.system)
 
     @cached_property
     def gains(self) -> np.ndarray:
         """K (M, nu, nx), to be used in turn."""
-        if self.setting.policy == "steady" and self.steady:
+        if self.settings.policy == "steady" and self.steady:
             return self.steady.gain[None]
         assert self.optimal is not None
-        return self.optimal.gains[:1] if self.setting.policy == "receding" else self.optimal.gains
+        return self.optimal.gains[:1] if self.settings.policy == "receding" else self.optimal.gains
 
     @cached_property
     def values(self) -> np.ndarray:
         """P (M, nx, nx): what the policy expects to pay from each of these steps on."""
-        if self.setting.policy == "steady" and self.steady:
+        if self.settings.policy == "steady" and self.steady:
             return self.steady.value[None]
         assert self.optimal is not None
         return self.optimal.values[: len(self.gains)]
@@ -86,11 +86,11 @@ class Regulator:
     @cached_property
     def growth(self) -> float:
         """By what factor dx grows or shrinks in a period in the long run, where it is small: the
-        spectral radius of one turn, per period."""
-        p, turn = self.problem, np.eye(self.problem.n)
+        spectral radius of one cycle of gains, per period."""
+        p, cycle = self.problem, np.eye(self.problem.n)
         for gain in self.gains:
-            turn = (p.a + p.b @ gain) @ turn
-        return float(np.abs(np.linalg.eigvals(turn)).max() ** (1.0 / len(self.gains)))
+            cycle = (p.a + p.b @ gain) @ cycle
+        return float(np.abs(np.linalg.eigvals(cycle)).max() ** (1.0 / len(self.gains)))
 
     @cached_property
     def mismatch(self) -> float:
@@ -100,21 +100,24 @@ class Regulator:
         if self.steady is None:
             return -1.0
         try:
-            theirs = steady_state_directly(p.a, p.b, p.q, p.r).value
+            reference = steady_state_directly(p.a, p.b, p.q, p.r)
         except LabError:
             return -1.0
-        return float(np.abs(self.steady.value - theirs).max() / np.abs(theirs).max())
+        if reference.trouble:
+            return -1.0
+        return float(
+            np.abs(self.steady.value - reference.value).max() / np.abs(reference.value).max()
+        )
 
     @cached_property
-    def constant(self) -> int:
-        """How many gains of the horizon, from t = 0 on, are the steady one as far as SETTLED."""
-        return settled(self.shares()[1]) + 1
+    def constant_gains(self) -> int:
+        """How many gains of the horizon, from t = 0 on, are the steady one within SETTLING_BAND."""
+        return last_settled(self.relative_to_steady()[1]) + 1
 
-    def shares(self) -> tuple[np.ndarray, np.ndarray]:
-        """How elements of P_t (N + 1, k) and K_t (N, k) come to rest, as shares of their steady
-        values, or of those at t = 0 where there is no steady state: P_ii, and K_1i or, with as
-        many controls as coordinates, K_ii; at most six. An element that rests at zero is left
-        out."""
+    def relative_to_steady(self) -> tuple[np.ndarray, np.ndarray]:
+        """Elements of P_t (N + 1, k) and K_t (N, k) as shares of their steady values, or of those
+        at t = 0 where there is no steady state: P_ii, and K_1i or, with several controls, K_ii;
+        at most six. An element whose steady value is zero is left out."""
         if self.optimal is None:
             return np.zeros((0, 0)), np.zeros((0, 0))
         gains, values = self.optimal.gains, self.optimal.values
@@ -133,33 +136,33 @@ class Regulator:
         return float(dx @ self.problem.q @ dx + du @ self.problem.r @ du)
 
 
-def settled(shares: np.ndarray) -> int:
-    """The last t up to which all shares (N, k) are within SETTLED of 1; -1 if that is none."""
-    off = np.abs(shares - 1.0).max(axis=1, initial=0.0) > SETTLED
+def last_settled(shares: np.ndarray) -> int:
+    """The last t up to which all shares (N, k) are within SETTLING_BAND of 1; -1 if none is."""
+    off = np.abs(shares - 1.0).max(axis=1, initial=0.0) > SETTLING_BAND
     return int(np.argmax(off)) - 1 if off.any() else len(shares) - 1
 
 
 @lru_cache(maxsize=64)
-def regulator(setting: Setting) -> Regulator:
-    """The regulator of this setting; the same object every time."""
-    system = linear_system(setting.system)
-    a, b = system.linear(setting.period)
+def regulator(settings: RegulatorSettings) -> Regulator:
+    """The regulator of these settings; the same object every time."""
+    system = linear_system(settings.system)
+    a, b = system.linear(settings.period)
     nq = system.mechanism.nq
-    slide, turn, slide_rate, turn_rate = setting.weights
-    places = [slide if i in system.sliding else turn for i in range(nq)]
-    rates = [slide_rate if i in system.sliding else turn_rate for i in range(nq)]
-    q, r = np.diag([*places, *rates]), setting.r * np.eye(system.nu)
+    slide, turn, slide_rate, turn_rate = settings.weights
+    places = [slide if i in system.prismatic else turn for i in range(nq)]
+    rates = [slide_rate if i in system.prismatic else turn_rate for i in range(nq)]
+    q, r = np.diag([*places, *rates]), settings.r * np.eye(system.nu)
     steady, trouble = None, ""
     try:
-        steady = steady_state(a, b, q, r, most=MOST)
+        steady = steady_state(a, b, q, r, most=MAX_RECURSIONS)
     except LabError as error:
-        if setting.policy == "steady" or setting.final == "p":
+        if settings.policy == "steady" or settings.final == "p":
             trouble = f"There is no steady state to regulate to: {error}."
-    rest = steady.value if setting.final == "p" and steady else q
-    problem = LqrProblem(setting.horizon, a, b, q, r, setting.alpha * rest)
+    final = steady.value if settings.final == "p" and steady else q
+    problem = LqrProblem(settings.horizon, a, b, q, r, settings.alpha * final)
     optimal = None
     try:
         optimal = solve(problem)
     except LabError as error:
         trouble = trouble or f"There is no policy over the horizon: {error}."
-    return Regulator(setting, problem, optimal, steady, trouble)
+    return Regulator(settings, problem, optimal, steady, trouble)

@@ -27,18 +27,18 @@ import pinocchio as pin
 
 from labs.algorithms.inverse_kinematics import pose_error
 from labs.errors import LabError
-from labs.models.cart_pole import HEIGHT
+from labs.models.cart_pole import HINGE_HEIGHT
 from labs.models.discrete import Discrete
 from labs.models.mechanisms import Mechanism, mechanism
 
-H = 0.02
-"""[s] between two samples: the control period."""
-METHOD = "rk4"
+CONTROL_PERIOD = 0.02
+"""h [s] between two samples."""
+INTEGRATION_METHOD = "rk4"
 """Integrates the mechanism over one control period."""
-CLOSE, MOST = 1e-10, 30
+POSE_TOLERANCE, MAX_NEWTON_STEPS = 1e-10, 30
 """Newton's method ends where the pose is off by less, in m and rad; steps it may take."""
 
-Flat = tuple[np.ndarray, np.ndarray, np.ndarray]
+PlanePath = tuple[np.ndarray, np.ndarray, np.ndarray]
 """s, ds/dphi and d2s/dphi2 of a path in a plane, each (M, 2), at phases phi (M,) [cycles]."""
 
 PLANES: Mapping[str, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
@@ -54,14 +54,14 @@ FEED_FORWARDS: Mapping[str, str] = {
 }
 
 
-def circle(phase: np.ndarray) -> Flat:
+def circle(phase: np.ndarray) -> PlanePath:
     """(cos, sin)(2 pi phi)."""
     turn = 2.0 * np.pi
     s = np.stack([np.cos(turn * phase), np.sin(turn * phase)], axis=1)
     return s, turn * np.stack([-s[:, 1], s[:, 0]], axis=1), -(turn**2) * s
 
 
-def square(phase: np.ndarray) -> Flat:
+def square(phase: np.ndarray) -> PlanePath:
     """The square inscribed in the unit circle, from the middle of its right side up and round, at
     constant speed; at a corner the side that begins there counts."""
     half = np.sqrt(0.5)
@@ -73,12 +73,12 @@ def square(phase: np.ndarray) -> Flat:
     return half * (normal + (2.0 * done - 1.0) * ahead), 8.0 * half * ahead, np.zeros_like(ahead)
 
 
-PATHS: Mapping[str, Callable[[np.ndarray], Flat]] = {"circle": circle, "square": square}
+PATHS: Mapping[str, Callable[[np.ndarray], PlanePath]] = {"circle": circle, "square": square}
 
 
 @dataclass(frozen=True)
 class Course:
-    """Where a mechanism is sent: one lap of `samples` steps of H."""
+    """Where a mechanism is sent: one lap of `samples` control periods."""
 
     robot: str
     """"ur5" or "cart-pole"."""
@@ -123,8 +123,8 @@ def lap(course: Course, feed_forward: str = "inverse-dynamics", force: float = 0
     )
     x_ref = np.hstack([q, v])
     pushed = u_ref + np.stack([side_force(robot, row, force) for row in q])
-    after, A, B = Discrete(robot, H, METHOD).linearize(x_ref, pushed)
-    points = np.stack([tracked(robot, row) for row in q])
+    after, A, B = Discrete(robot, CONTROL_PERIOD, INTEGRATION_METHOD).linearize(x_ref, pushed)
+    points = np.stack([tracked_point(robot, row) for row in q])
     return Lap(x_ref, u_ref, A, B, after - np.roll(x_ref, -1, axis=0), points)
 
 
@@ -138,9 +138,9 @@ def side_force(robot: Mechanism, q: np.ndarray, force: float) -> np.ndarray:
     return force * robot.tip_jacobian(q)[1, list(robot.driven)]
 
 
-def tracked(robot: Mechanism, q: np.ndarray) -> np.ndarray:
+def tracked_point(robot: Mechanism, q: np.ndarray) -> np.ndarray:
     """Position (3,) [m] of what is to follow the path: the end-effector, or the cart's hinge."""
-    return np.array([0.0, q[0], HEIGHT]) if robot.name == "cart-pole" else robot.tip(q)
+    return np.array([0.0, q[0], HINGE_HEIGHT]) if robot.name == "cart-pole" else robot.tip(q)
 
 
 def _feed_forward(
@@ -158,7 +158,7 @@ def _feed_forward(
 def _motion(course: Course) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """q, q' and q'' (M, nq) along the course."""
     flat = PATHS[course.path](np.arange(course.samples) / course.samples)
-    rate = 1.0 / (course.samples * H)
+    rate = 1.0 / (course.samples * CONTROL_PERIOD)
     s, ds, dds = (course.size * rate**k * part for k, part in enumerate(flat))
     if course.robot == "cart-pole":
         return _upright(course, s, ds, dds)
@@ -191,10 +191,10 @@ def _reaching(
     Q, V, A = np.empty((3, course.samples, robot.nq))
     for i in range(course.samples):
         target = pin.SE3(home.rotation, home.translation + p[i])
-        for _ in range(MOST):
+        for _ in range(MAX_NEWTON_STEPS):
             jacobian = pin.computeFrameJacobian(model, data, q, tip, axes)
             error = pose_error(data.oMf[tip], target)
-            if np.abs(error).max() < CLOSE:
+            if np.abs(error).max() < POSE_TOLERANCE:
                 break
             q = q + np.linalg.solve(jacobian, error)
         else:
@@ -206,5 +206,5 @@ def _reaching(
         drift = pin.getFrameClassicalAcceleration(model, data, tip, axes).vector
         a = np.linalg.solve(jacobian, np.concatenate([ddp[i], np.zeros(3)]) - drift)
         Q[i], V[i], A[i] = q, v, a
-        q = q + H * v + 0.5 * H**2 * a
+        q = q + CONTROL_PERIOD * v + 0.5 * CONTROL_PERIOD**2 * a
     return Q, V, A

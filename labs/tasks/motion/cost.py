@@ -19,7 +19,7 @@ EPSILON = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Reach:
+class TipCost:
     """rho |p(q) - p*|^2, with p* (3,) [m] and rho [1/m^2]."""
 
     mechanism: Mechanism
@@ -34,7 +34,7 @@ class Reach:
     def gradient(self, x: np.ndarray) -> np.ndarray:
         """(nq,): 2 rho J' (p - p*)."""
         q = x[: self.mechanism.nq]
-        return self._pull(q, self.mechanism.tip(q) - self.target)
+        return self._gradient(q, self.mechanism.tip(q) - self.target)
 
     def hessian(self, x: np.ndarray, exact: bool) -> np.ndarray:
         """(nq, nq): 2 rho J'J, exactly with the curvature of p besides."""
@@ -44,14 +44,15 @@ class Reach:
         if exact:
             error = self.mechanism.tip(q) - self.target
             for k, e in enumerate(np.eye(len(q)) * EPSILON):
-                ahead, behind = self._pull(q + e, error), self._pull(q - e, error)
+                ahead, behind = self._gradient(q + e, error), self._gradient(q - e, error)
                 hessian[:, k] += (ahead - behind) / (2.0 * EPSILON)
         symmetric: np.ndarray = 0.5 * (hessian + hessian.T)
         return symmetric
 
-    def _pull(self, q: np.ndarray, error: np.ndarray) -> np.ndarray:
-        pull: np.ndarray = 2.0 * self.rho * self.mechanism.tip_jacobian(q).T @ error
-        return pull
+    def _gradient(self, q: np.ndarray, error: np.ndarray) -> np.ndarray:
+        """2 rho J(q)' error."""
+        gradient: np.ndarray = 2.0 * self.rho * self.mechanism.tip_jacobian(q).T @ error
+        return gradient
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,23 +66,23 @@ class MotionCost:
     Q_f: np.ndarray
     x_ref: np.ndarray
     u_ref: np.ndarray
-    reach: Reach | None = None
+    tip_cost: TipCost | None = None
 
     def value(self, X: np.ndarray, U: np.ndarray) -> float:
         dX, dU = X - self.x_ref, U - self.u_ref
         running = np.vdot(dX[:-1] @ self.Q, dX[:-1]) + np.vdot(dU @ self.R, dU)
         final = dX[-1] @ self.Q_f @ dX[-1]
-        return float(running + final) + (self.reach.value(X[-1]) if self.reach else 0.0)
+        return float(running + final) + (self.tip_cost.value(X[-1]) if self.tip_cost else 0.0)
 
     def derivatives(self, X: np.ndarray, U: np.ndarray, exact: bool) -> CostDerivatives:
         dX, dU = X - self.x_ref, U - self.u_ref
         l_x = 2.0 * dX @ self.Q
         l_x[-1] = 2.0 * self.Q_f @ dX[-1]
         l_xx, l_ux, l_uu = self._hessians
-        if self.reach:
-            n, l_xx = self.reach.mechanism.nq, l_xx.copy()
-            l_x[-1, :n] += self.reach.gradient(X[-1])
-            l_xx[-1, :n, :n] += self.reach.hessian(X[-1], exact)
+        if self.tip_cost:
+            n, l_xx = self.tip_cost.mechanism.nq, l_xx.copy()
+            l_x[-1, :n] += self.tip_cost.gradient(X[-1])
+            l_xx[-1, :n, :n] += self.tip_cost.hessian(X[-1], exact)
         return CostDerivatives(l_x, 2.0 * dU @ self.R, l_xx, l_ux, l_uu)
 
     @cached_property

@@ -14,14 +14,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 
 from labs.errors import LabError
 from labs.models.discrete import Discrete
 from labs.models.mechanisms import Mechanism, mechanism
-from labs.problems.optimal_control import Problem
+from labs.problems.optimal_control import OptimalControlProblem
 from labs.shapes import Vector3
-from labs.tasks.motion.cost import MotionCost, Reach
+from labs.tasks.motion.cost import MotionCost, TipCost
 
 
 @dataclass(frozen=True)
@@ -31,30 +30,32 @@ class Motion:
     title: str
     goal: tuple[float, ...]
     """q* (nq,) [rad; m], empty where the tip has a place to reach."""
-    size: tuple[float, ...]
+    control_scale: tuple[float, ...]
     """u_0 (nu,) [N m; N]: what holds a pendulum level; the motors' limits of cart and arm."""
     camera: tuple[Vector3, Vector3]
     """Where a viewer stands and what it looks at [m]."""
-    shown: int = 0
+    shown_joint: int = 0
     """The joint whose phase portrait tells most."""
 
 
-NEAR = ((1.5, 0.6, 0.95), (0.0, 0.0, 0.72))
-FAR = ((2.6, 1.0, 1.5), (0.0, 0.0, 1.2))
-RAIL = ((2.3, 0.6, 1.1), (0.0, 0.0, 0.75))
-ROBOT = ((1.15, -0.85, 0.8), (0.22, -0.02, 0.33))
+NEAR_VIEW = ((1.5, 0.6, 0.95), (0.0, 0.0, 0.72))
+FAR_VIEW = ((2.6, 1.0, 1.5), (0.0, 0.0, 1.2))
+RAIL_VIEW = ((2.3, 0.6, 1.1), (0.0, 0.0, 0.75))
+ROBOT_VIEW = ((1.15, -0.85, 0.8), (0.22, -0.02, 0.33))
 MOTIONS: Mapping[str, Motion] = {
-    "pendulum": Motion("Pendulum", (np.pi,), (4.905,), NEAR),
-    "double-pendulum": Motion("Double pendulum", (np.pi, 0.0), (19.62, 4.905), FAR),
-    "acrobot": Motion("Acrobot: elbow driven alone", (np.pi, 0.0), (4.905,), FAR),
-    "pendubot": Motion("Pendubot: shoulder driven alone", (np.pi, 0.0), (19.62,), FAR),
-    "cart-pole": Motion("Cart-pole", (0.0, np.pi), (20.0,), RAIL, shown=1),
-    "ur5": Motion("UR5, reaching", (), (150.0, 150.0, 150.0, 28.0, 28.0, 28.0), ROBOT, shown=1),
+    "pendulum": Motion("Pendulum", (np.pi,), (4.905,), NEAR_VIEW),
+    "double-pendulum": Motion("Double pendulum", (np.pi, 0.0), (19.62, 4.905), FAR_VIEW),
+    "acrobot": Motion("Acrobot: elbow driven alone", (np.pi, 0.0), (4.905,), FAR_VIEW),
+    "pendubot": Motion("Pendubot: shoulder driven alone", (np.pi, 0.0), (19.62,), FAR_VIEW),
+    "cart-pole": Motion("Cart-pole", (0.0, np.pi), (20.0,), RAIL_VIEW, shown_joint=1),
+    "ur5": Motion(
+        "UR5, reaching", (), (150.0, 150.0, 150.0, 28.0, 28.0, 28.0), ROBOT_VIEW, shown_joint=1
+    ),
 }
 
 
 @dataclass(frozen=True)
-class Weights:
+class MotionWeights:
     """Of J."""
 
     goal: float
@@ -71,68 +72,63 @@ class Weights:
 
 def motion_problem(
     name: str,
-    weights: Weights,
+    weights: MotionWeights,
     N: int,
     h: float,
     *,
     method: str = "rk4",
     target: np.ndarray | None = None,
     limit: float = np.inf,
-) -> Problem:
+) -> OptimalControlProblem:
     """The motion of this name, a key of MOTIONS. `target` is p* (3,) [m] of a reach, `method` a
     name of INTEGRATORS, and `limit` times u_0 is the most that |u| may be. Raises LabError."""
     if name not in MOTIONS:
         raise LabError(f"no motion is named {name!r}; there are {', '.join(MOTIONS)}")
-    motion, moved = MOTIONS[name], mechanism(name)
-    n, size = moved.nq, np.array(motion.size)
-    at_rest, x0 = np.zeros(n), np.concatenate([moved.arm.home, np.zeros(n)])
-    reach = None
+    motion, system = MOTIONS[name], mechanism(name)
+    n, home, u_0 = system.nq, system.arm.home, np.array(motion.control_scale)
+    at_rest, tip_cost = np.zeros(n), None
     if not motion.goal:
         if target is None:
             raise LabError(f"{name} takes a target for its tip: (3,) [m]")
-        reach = Reach(moved, target, weights.goal)
+        tip_cost = TipCost(system, target, weights.goal)
     cost = MotionCost(
         N,
         Q=h * np.diag(np.repeat([weights.posture, weights.velocity], n)),
-        R=h * np.diag(weights.control / size**2),
-        Q_f=np.diag(np.repeat([0.0 if reach else weights.goal, weights.rest], n)),
-        x_ref=np.concatenate([motion.goal or moved.arm.home, at_rest]),
-        u_ref=moved.holding(moved.arm.home),
-        reach=reach,
+        R=h * np.diag(weights.control / u_0**2),
+        Q_f=np.diag(np.repeat([0.0 if tip_cost else weights.goal, weights.rest], n)),
+        x_ref=np.concatenate([motion.goal or home, at_rest]),
+        u_ref=system.holding(home),
+        tip_cost=tip_cost,
     )
-    bound = limit * size if np.isfinite(limit) else None
-    return Problem(Discrete(moved, h, method), cost, x0, N, bound)
+    bound = limit * u_0 if np.isfinite(limit) else None
+    x0 = np.concatenate([home, at_rest])
+    return OptimalControlProblem(Discrete(system, h, method), cost, x0, N, bound)
 
 
-def first_guess(problem: Problem, size: np.ndarray, amplitude: float, rate: float) -> np.ndarray:
-    """U (N, nu) = u_ref + amplitude u_0 cos(2 pi rate t), with u_0 = `size` (nu,) and `rate` in
-    Hz; at rate 0 it is a constant push. Within the bound of the problem."""
+def first_guess(
+    problem: OptimalControlProblem, u_0: np.ndarray, amplitude: float, rate: float
+) -> np.ndarray:
+    """U (N, nu) = u_ref + amplitude u_0 cos(2 pi rate t), with u_0 (nu,) and `rate` in Hz; at
+    rate 0 it is a constant push. Within the bound of the problem."""
     assert isinstance(problem.cost, MotionCost)
     assert isinstance(problem.dynamics, Discrete)
     t = problem.dynamics.h * np.arange(problem.N)
-    U = problem.cost.u_ref + amplitude * np.cos(2.0 * np.pi * rate * t)[:, None] * size
-    return within(problem, U)
+    U = problem.cost.u_ref + amplitude * np.cos(2.0 * np.pi * rate * t)[:, None] * u_0
+    return clip_controls(problem, U)
 
 
-def resampled(U: np.ndarray, h: float, new_h: float, N: int) -> np.ndarray:
+def resample(U: np.ndarray, h: float, new_h: float, N: int) -> np.ndarray:
     """The controls (k, nu), each held for h, as N that are held for new_h; beyond their end the
     last one lasts."""
     middle = (np.arange(N) + 0.5) * new_h
     return np.asarray(U[np.minimum((middle / h).astype(int), len(U) - 1)])
 
 
-def within(problem: Problem, U: np.ndarray) -> np.ndarray:
+def clip_controls(problem: OptimalControlProblem, U: np.ndarray) -> np.ndarray:
     """U (N, nu) cut to the bound of the problem."""
     return U if problem.bound is None else np.clip(U, -problem.bound, problem.bound)
 
 
-def struck(moved: Mechanism, q: np.ndarray, impulse: np.ndarray) -> np.ndarray:
-    """How v (nv,) jumps when an impulse (3,) [N s] strikes the tip at q: M^-1 J' impulse."""
-    J = moved.tip_jacobian(q)
-    inverse = np.reshape(pin.computeMinverse(moved.model, moved.data, q), (len(q), len(q)))
-    return np.asarray(inverse @ J.T @ impulse)
-
-
-def tips(moved: Mechanism, X: np.ndarray) -> np.ndarray:
+def tip_path(system: Mechanism, X: np.ndarray) -> np.ndarray:
     """Where the tip is (k, 3) [m] along X (k, nx)."""
-    return np.array([moved.tip(x[: moved.nq]) for x in X])
+    return np.array([system.tip(x[: system.nq]) for x in X])

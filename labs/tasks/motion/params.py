@@ -1,13 +1,13 @@
-"""The tunables of a motion to plan (`labs.tasks.motion.motions`), in three groups."""
+"""The tunables of a motion to plan (`labs.tasks.motion.motions`),."""
 
 import numpy as np
 
 from labs.algorithms.integrators import INTEGRATORS
 from labs.params import Group, Params
-from labs.problems.optimal_control import Problem
-from labs.tasks.motion.motions import MOTIONS, Motion, Weights, motion_problem
+from labs.problems.optimal_control import OptimalControlProblem
+from labs.tasks.motion.motions import MOTIONS, Motion, MotionWeights, motion_problem
 
-STEPS = {0.01: "10 ms", 0.02: "20 ms", 0.04: "40 ms"}
+TIME_STEPS = {0.01: "10 ms", 0.02: "20 ms", 0.04: "40 ms"}
 
 
 MOTION = Group("Motion", effect="restart")
@@ -39,7 +39,7 @@ class MotionParams(Params):
     """Weight of the controls, R: each is measured in units of its own size u_0."""
     horizon: float = HORIZON.knob(2.0, 0.5, 3.0, "T", "s", "Horizon", step=0.1)
     """How long the motion may take; N = T / h steps."""
-    h: float = HORIZON.choice(0.02, STEPS, "Time step", "h", "s")
+    h: float = HORIZON.choice(0.02, TIME_STEPS, "Time step", "h", "s")
     """Of the plan; the plant is integrated in steps of 5 ms."""
     integrator: str = HORIZON.choice(
         "rk4", {name: method.title for name, method in INTEGRATORS.items()}, "Integrator"
@@ -62,9 +62,9 @@ class MotionParams(Params):
         return MOTIONS[self.system]
 
     @property
-    def size(self) -> np.ndarray:
+    def control_scale(self) -> np.ndarray:
         """u_0 (nu,)."""
-        return np.array(self.motion.size)
+        return np.array(self.motion.control_scale)
 
     @property
     def target(self) -> np.ndarray:
@@ -73,13 +73,13 @@ class MotionParams(Params):
     @property
     def bound(self) -> np.ndarray | None:
         """(nu,) most that |u| may be."""
-        return self.limit * self.size if self.limited else None
+        return self.limit * self.control_scale if self.limited else None
 
-    def problem(self, N: int, h: float) -> Problem:
+    def problem(self, N: int, h: float) -> OptimalControlProblem:
         """With a horizon of N steps of h."""
         return motion_problem(
             self.system,
-            Weights(self.goal, self.rest, self.posture, self.velocity, self.control),
+            MotionWeights(self.goal, self.rest, self.posture, self.velocity, self.control),
             N,
             h,
             method=self.integrator,

@@ -9,25 +9,24 @@ T/h steps of RK4 with h = 10 ms. For the mass on a line, which is linear, that i
 A = [1 T; 0 1], B = [T^2/2; T]/m.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
 
 import numpy as np
-import pinocchio as pin
 
 from labs.algorithms.integrators import rk4
 from labs.errors import LabError
 from labs.models.arms import load
-from labs.models.cart_pole import REACH
+from labs.models.cart_pole import HALF_RAIL
 from labs.models.discrete import Discrete
 from labs.models.mass_on_a_line import mass_on_a_line
 from labs.models.mechanisms import Mechanism, mechanism
+from labs.models.plant import Force, Plant
 from labs.shapes import Vector3
 
-STEP = 0.01
+SIMULATION_STEP = 0.01
 """h [s], of the simulation."""
-TURN = 2.0 * np.pi
 CAMERAS: Mapping[str, tuple[Vector3, Vector3]] = {
     "cart-pole": ((2.2, 0.45, 1.2), (0.0, 0.0, 0.8)),
     "pendulum": ((1.2, 0.6, 1.05), (0.0, 0.0, 0.88)),
@@ -35,7 +34,7 @@ CAMERAS: Mapping[str, tuple[Vector3, Vector3]] = {
     "ur5": ((0.77, -0.54, 0.62), (0.22, 0.05, 0.38)),
 }
 """Where a viewer stands and what it looks at [m]."""
-FASTEST = 100.0
+LARGEST_RATE = 100.0
 """[m/s, rad/s] faster than this nothing here is meant to go."""
 
 
@@ -49,12 +48,12 @@ class LinearSystem:
     """(nx,) the rest (q_eq, 0)."""
     u_eq: np.ndarray
     """(nu,) [N; N m] what holds it there."""
-    sliding: tuple[int, ...]
+    prismatic: tuple[int, ...]
     """The coordinates q_i that slide [m]; the others turn [rad]."""
-    reach: float
+    half_rail: float
     """[m] half the rail's length; infinite where nothing slides."""
-    spring: float
-    """[N/m] of the hand that pulls at the tip: as stiff as suits the weight."""
+    pull_stiffness: float
+    """[N/m] of the spring by which a hand pulls at the tip: as suits the weight."""
 
     @property
     def nx(self) -> int:
@@ -70,57 +69,39 @@ class LinearSystem:
         return CAMERAS[self.name]
 
     def linear(self, period: float) -> tuple[np.ndarray, np.ndarray]:
-        """A (nx, nx) and B (nx, nu) over `period` [s], a multiple of STEP."""
+        """A (nx, nx) and B (nx, nu) over `period` [s], a multiple of SIMULATION_STEP."""
         return _linear(self.name, period)
 
-    def step(self, x: np.ndarray, u: np.ndarray, force: "Force | None" = None) -> np.ndarray:
-        """x+ (nx,) after STEP, by RK4: u (nu,) is held, `force` acts on the tip."""
+    def step(self, x: np.ndarray, u: np.ndarray, force: Force | None = None) -> np.ndarray:
+        """x+ (nx,) after SIMULATION_STEP, by RK4: u (nu,) is held, `force` acts on the tip."""
         n = self.mechanism.nq
-        after = np.empty(2 * n)
+        after, acceleration = np.empty(2 * n), self.mechanism.acceleration(u, force)
         with np.errstate(all="ignore"):
-            after[:n], after[n:] = rk4(self._acceleration(u, force), x[:n], x[n:], STEP)
+            after[:n], after[n:] = rk4(acceleration, x[:n], x[n:], SIMULATION_STEP)
         return after
 
-    def in_plane(self, x: np.ndarray) -> np.ndarray:
+    def phase_point(self, x: np.ndarray) -> np.ndarray:
         """(2,) the deviation of the coordinate that tells most, and its rate: of the pole, the
         pendulum, the mass, the UR5's second joint."""
         nq = self.mechanism.nq
         i = 1 if self.name == "ur5" else nq - 1
         return np.asarray((x - self.x_eq)[[i, nq + i]])
 
-    def lost(self, x: np.ndarray) -> str:
-        """Why nobody can follow it any further, "it ..."; empty while one can."""
+    def out_of_range(self, x: np.ndarray) -> str:
+        """Why it is simulated no further, "it ..."; empty while it is."""
         nq = self.mechanism.nq
         dx = x - self.x_eq
-        turning = [i for i in range(nq) if i not in self.sliding]
-        if not np.abs(dx[list(self.sliding)]).max(initial=0.0) <= self.reach:
-            return f"it ran off its rail, {self.reach:g} m either way"
-        if not np.abs(dx[turning]).max(initial=0.0) <= 2.0 * TURN:
+        turning = [i for i in range(nq) if i not in self.prismatic]
+        if not np.abs(dx[list(self.prismatic)]).max(initial=0.0) <= self.half_rail:
+            return f"it ran off its rail, {self.half_rail:g} m either way"
+        if not np.abs(dx[turning]).max(initial=0.0) <= 4.0 * np.pi:
             return "it had turned twice round"
-        if not np.abs(dx[nq:]).max() <= FASTEST:
-            return f"it passed {FASTEST:g} m/s or rad/s"
+        if not np.abs(dx[nq:]).max() <= LARGEST_RATE:
+            return f"it passed {LARGEST_RATE:g} m/s or rad/s"
         return ""
 
-    def _acceleration(
-        self, u: np.ndarray, force: "Force | None"
-    ) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-        world = self.mechanism
-        if force is None:
-            return world.acceleration(u)
-        pull, tau = force, world.S @ u
 
-        def acceleration(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-            pulled = world.tip_jacobian(q).T @ pull(world.tip(q))
-            a: np.ndarray = pin.aba(world.model, world.data, q, v, tau + pulled)
-            return a
-
-        return acceleration
-
-
-Force = Callable[[np.ndarray], np.ndarray]
-"""The tip's position (3,) [m] to the force on it (3,) [N]."""
-
-SYSTEMS: Mapping[str, str] = {
+LINEAR_SYSTEMS: Mapping[str, str] = {
     "cart-pole": "Cart-pole, upright",
     "pendulum": "Pendulum, upright",
     "mass": "Mass on a line",
@@ -133,42 +114,44 @@ def linear_system(name: str) -> LinearSystem:
     """The system of this name. Raises LabError, listing those there are."""
     match name:
         case "cart-pole":
-            return _at_rest(name, mechanism(name), [0.0, np.pi], (0,), REACH, 10.0)
+            return _at_rest(name, mechanism(name), [0.0, np.pi], (0,), HALF_RAIL, 10.0)
         case "pendulum":
             return _at_rest(name, mechanism(name), [np.pi], (), np.inf, 40.0)
         case "mass":
             arm = mass_on_a_line()
-            moved = Mechanism(name, arm, arm.model, arm.model.createData(), (0,), 0.0)
-            return _at_rest(name, moved, [0.0], (0,), REACH, 20.0)
+            block = Mechanism(name, Plant(arm, arm.model, arm.model.createData()), (0,), 0.0)
+            return _at_rest(name, block, [0.0], (0,), HALF_RAIL, 20.0)
         case "ur5":
             home = load(name).home
             return _at_rest(name, mechanism(name), list(home), (), np.inf, 300.0)
         case _:
-            raise LabError(f"no linear system is named {name!r}; there are {', '.join(SYSTEMS)}")
+            raise LabError(
+                f"no linear system is named {name!r}; there are {', '.join(LINEAR_SYSTEMS)}"
+            )
 
 
 def _at_rest(
     name: str,
-    moved: Mechanism,
+    body: Mechanism,
     q: list[float],
-    sliding: tuple[int, ...],
-    reach: float,
-    spring: float,
+    prismatic: tuple[int, ...],
+    half_rail: float,
+    pull_stiffness: float,
 ) -> LinearSystem:
     q_eq = np.array(q)
-    x_eq = np.concatenate([q_eq, np.zeros(moved.nq)])
-    return LinearSystem(name, moved, x_eq, moved.holding(q_eq), sliding, reach, spring)
+    x_eq, u_eq = np.concatenate([q_eq, np.zeros(body.nq)]), body.holding(q_eq)
+    return LinearSystem(name, body, x_eq, u_eq, prismatic, half_rail, pull_stiffness)
 
 
 @lru_cache(maxsize=32)
 def _linear(name: str, period: float) -> tuple[np.ndarray, np.ndarray]:
-    """[A B; 0 I] over one STEP, to the power of their number."""
-    steps = round(period / STEP)
-    if steps < 1 or abs(steps * STEP - period) > 1e-9:
-        raise LabError(f"T = {period} s: it takes whole steps of {STEP} s, one at least")
+    """[A B; 0 I] over one SIMULATION_STEP, to the power of their number."""
+    steps = round(period / SIMULATION_STEP)
+    if steps < 1 or abs(steps * SIMULATION_STEP - period) > 1e-9:
+        raise LabError(f"T = {period} s: it takes whole steps of {SIMULATION_STEP} s, one at least")
     system = linear_system(name)
     n, m = system.nx, system.nu
-    one = Discrete(system.mechanism, STEP, "rk4")
+    one = Discrete(system.mechanism, SIMULATION_STEP, "rk4")
     _, a, b = one.linearize(system.x_eq[None], system.u_eq[None])
     both = np.block([[a[0], b[0]], [np.zeros((m, n)), np.eye(m)]])
     power = np.linalg.matrix_power(both, steps)

@@ -11,9 +11,11 @@ import pinocchio as pin
 
 from labs.models.discrete import Discrete
 from labs.models.mechanisms import Mechanism
-from labs.problems.optimal_control import Problem
+from labs.problems.optimal_control import OptimalControlProblem
 from labs.tasks.motion.cost import MotionCost
 
+BARRIER = 1e-8
+"""Of a warm start: its weight, and how far from a bound it begins."""
 STAGES = {"explicit-euler": 1, "semi-implicit-euler": 1, "rk4": 4}
 
 
@@ -91,8 +93,11 @@ class Optimum:
     U: np.ndarray
 
 
-def optimum(problem: Problem, X: np.ndarray, U: np.ndarray) -> Optimum:
-    """Of the local minimum near X (N + 1, nx), U (N, nu), where Ipopt starts."""
+def optimum(
+    problem: OptimalControlProblem, X: np.ndarray, U: np.ndarray, warm: bool = False
+) -> Optimum:
+    """Of the local minimum near X (N + 1, nx), U (N, nu), where Ipopt starts: well within the
+    bounds, or if `warm`, right there, with a small barrier."""
     plant, cost, N = problem.dynamics, problem.cost, problem.N
     assert isinstance(plant, Discrete)
     assert isinstance(cost, MotionCost)
@@ -135,11 +140,15 @@ def optimum(problem: Problem, X: np.ndarray, U: np.ndarray) -> Optimum:
         J += dx.T @ cost.Q @ dx + du.T @ cost.R @ du
     dx = x[:, N] - cost.x_ref
     J += dx.T @ cost.Q_f @ dx
-    if cost.reach:
-        off = tip_position(m)(x[:n, N]) - cost.reach.target
-        J += cost.reach.rho * ca.dot(off, off)
+    if cost.tip_cost:
+        off = tip_position(m)(x[:n, N]) - cost.tip_cost.target
+        J += cost.tip_cost.rho * ca.dot(off, off)
     opti.minimize(J)
     quiet: Any = {"print_level": 0, "sb": "yes", "tol": 1e-10, "max_iter": 500}
+    if warm:
+        pushes = ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac")
+        quiet |= {"warm_start_init_point": "yes", "mu_init": BARRIER}
+        quiet |= {f"warm_start_{name}": BARRIER for name in pushes}
     opti.solver("ipopt", {"print_time": False}, quiet)
     found = opti.solve()
     states, controls = np.asarray(found.value(x)), np.asarray(found.value(u))

@@ -12,8 +12,9 @@ from labs.algorithms.ddp_sweep import backward_pass
 from labs.errors import LabError
 from labs.models.discrete import Discrete
 from labs.models.mechanisms import mechanism
-from labs.problems.optimal_control import Problem, expand, rollout, whole
-from labs.tasks.motion.cost import MotionCost, Reach
+from labs.problems.optimal_control import OptimalControlProblem, expand, rollout
+from labs.resumable import run_to_completion
+from labs.tasks.motion.cost import MotionCost, TipCost
 from tests.labs.algorithms.ipopt_oracle import inverse_dynamics, optimum, tip_position
 
 UPRIGHT = {"pendulum": [np.pi, 0.0], "cart-pole": [0.0, np.pi, 0.0, 0.0]}
@@ -21,7 +22,7 @@ UPRIGHT["double-pendulum"] = [np.pi, 0.0, 0.0, 0.0]
 METHODS = {"pendulum": "rk4", "cart-pole": "rk4"}
 
 
-def swing_up(name: str, N: int = 60, h: float = 0.025, r: float = 0.1) -> Problem:
+def swing_up(name: str, N: int = 60, h: float = 0.025, r: float = 0.1) -> OptimalControlProblem:
     m = mechanism(name)
     n = m.nq
     Q = np.diag([0.1] * n + [0.01] * n) * h
@@ -29,10 +30,10 @@ def swing_up(name: str, N: int = 60, h: float = 0.025, r: float = 0.1) -> Proble
     R = r * h * np.eye(m.nu)
     cost = MotionCost(N, Q, R, final, np.array(UPRIGHT[name]), np.zeros(m.nu))
     plant = Discrete(m, h, METHODS.get(name, "semi-implicit-euler"))
-    return Problem(plant, cost, np.zeros(2 * n), N)
+    return OptimalControlProblem(plant, cost, np.zeros(2 * n), N)
 
 
-def reach(N: int = 40, h: float = 0.02) -> tuple[Problem, np.ndarray]:
+def reach(N: int = 40, h: float = 0.02) -> tuple[OptimalControlProblem, np.ndarray]:
     m = mechanism("ur5")
     x0, holding = np.r_[m.arm.home, np.zeros(6)], m.holding(m.arm.home)
     cost = MotionCost(
@@ -42,12 +43,12 @@ def reach(N: int = 40, h: float = 0.02) -> tuple[Problem, np.ndarray]:
         np.diag([0.0] * 6 + [10.0] * 6),
         np.zeros(12),
         holding,
-        Reach(m, np.array([0.4, 0.4, 0.5]), 100.0),
+        TipCost(m, np.array([0.4, 0.4, 0.5]), 100.0),
     )
-    return Problem(Discrete(m, h), cost, x0, N), np.tile(holding, (N, 1))
+    return OptimalControlProblem(Discrete(m, h), cost, x0, N), np.tile(holding, (N, 1))
 
 
-def guess(problem: Problem) -> np.ndarray:
+def guess(problem: OptimalControlProblem) -> np.ndarray:
     return np.full((problem.N, problem.dynamics.nu), 0.1)
 
 
@@ -79,14 +80,14 @@ class Linear:
         return after, np.tile(self.A, (N, 1, 1)), np.tile(self.B, (N, 1, 1))
 
 
-def linear_quadratic(N: int = 30) -> Problem:
+def linear_quadratic(N: int = 30) -> OptimalControlProblem:
     rng = np.random.default_rng(3)
     A, B = np.eye(4) + 0.2 * rng.normal(size=(4, 4)), rng.normal(size=(4, 2))
     cost = MotionCost(N, np.eye(4), np.diag([0.5, 2.0]), 5.0 * np.eye(4), np.zeros(4), np.zeros(2))
-    return Problem(Linear(A, B), cost, rng.normal(size=4), N)
+    return OptimalControlProblem(Linear(A, B), cost, rng.normal(size=4), N)
 
 
-def riccati(p: Problem) -> tuple[np.ndarray, np.ndarray]:
+def riccati(p: OptimalControlProblem) -> tuple[np.ndarray, np.ndarray]:
     """Gains and values by the notes' recursion, written out."""
     A, B = p.dynamics.A, p.dynamics.B  # type: ignore[attr-defined]
     Q, R, P = p.cost.Q, p.cost.R, p.cost.Q_f  # type: ignore[attr-defined]
@@ -121,7 +122,7 @@ def test_a_linear_quadratic_problem_takes_one_step_to_riccati(second_order: bool
 def test_the_expected_change_holds_for_every_alpha_where_the_model_is_exact() -> None:
     p, options = linear_quadratic(), Options()
     at = ddp.init(p, np.ones((30, 2)), options)
-    model = whole(expand(p, at.X, at.U, second_order=False))
+    model = run_to_completion(expand(p, at.X, at.U, second_order=False))
     w, K = np.empty_like(at.w), np.empty_like(at.K)
     none = np.empty((0, 0))
     where, d_1, d_2 = backward_pass(
@@ -145,7 +146,7 @@ def test_the_oracle_has_the_same_dynamics(name: str) -> None:
     np.testing.assert_allclose(np.array(tip_position(m)(q)).ravel(), m.tip(q), atol=1e-12)
 
 
-def compare(problem: Problem, U: np.ndarray, options: Options) -> None:
+def compare(problem: OptimalControlProblem, U: np.ndarray, options: Options) -> None:
     found = ddp.solve(problem, U, options)
     assert found.converged, found.stopped
     rng = np.random.default_rng(0)

@@ -18,7 +18,7 @@ from labs.engine.events import Event, events_of, parse_event
 from labs.engine.headless import MAX_STEPS, run
 from labs.engine.run import World
 from labs.errors import LabError, ParameterError, UnknownLab
-from server.cli import _parser, _planned
+from server.cli import _arguments_of_options, _parser
 
 
 def a_world(**changes: object) -> World:
@@ -46,7 +46,7 @@ def run_command(line: str) -> World:
     words = shlex.split(line)
     assert words[:2] == ["orclab", "run"]
     options = _parser().parse_args(words[1:])
-    return run(**_planned(options), seconds=options.seconds)
+    return run(**_arguments_of_options(options), seconds=options.seconds)
 
 
 # The world's clock ----------------------------------------------------------------------------

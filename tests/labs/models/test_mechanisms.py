@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from labs.algorithms.integrators import INTEGRATORS
@@ -49,7 +50,7 @@ def test_only_the_driven_joint_feels_the_control(name: str, driven: int) -> None
     x, u = np.array([0.4, -1.0, 0.2, 0.5]), np.array([2.0])
     tau = np.zeros(2)
     tau[driven] = 2.0
-    whole = Mechanism("both", m.arm, m.model, m.model.createData(), (0, 1), 0.0)
+    whole = Mechanism("both", m.plant, (0, 1), 0.0)
     np.testing.assert_array_equal(m.f(x, u), whole.f(x, tau))
     np.testing.assert_array_equal(m.S[:, 0], np.eye(2)[driven])
 
@@ -119,3 +120,24 @@ def test_what_cannot_be_is_said() -> None:
         Discrete(mechanism("pendulum"), 0.1, "rk9")
     with pytest.raises(LabError, match=r"h = 0.0: a step takes a positive time"):
         Discrete(mechanism("pendulum"), 0.0)
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_an_impulse_is_a_strong_force_for_a_short_time(name: str) -> None:
+    moved = mechanism(name, 0.3)
+    q, impulse, short = moved.arm.home + 0.4, np.array([0.2, 0.5, -0.3]), 1e-8
+    torque = moved.tip_jacobian(q).T @ impulse / short
+    change = short * pin.aba(moved.model, moved.data, q, np.zeros(moved.nq), torque)
+    np.testing.assert_allclose(moved.velocity_jump(q, impulse), change, rtol=1e-5, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_a_force_on_the_tip_acts_beside_the_control(name: str) -> None:
+    """As the torque J' f, which may act where no motor does."""
+    moved, rng = mechanism(name, 0.3, 0.2), np.random.default_rng(5)
+    q, v = moved.arm.home + 0.4, rng.normal(size=moved.nq)
+    u, force = rng.normal(size=moved.nu), np.array([0.2, 0.5, -0.3])
+    tau = moved.S @ u - 0.2 * v + moved.tip_jacobian(q).T @ force
+    expected = pin.aba(moved.model, moved.data, q, v, tau)
+    found = moved.acceleration(u, lambda tip: force)(q, v)
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)

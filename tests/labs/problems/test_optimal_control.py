@@ -4,51 +4,21 @@ import numpy as np
 import pytest
 
 from labs.errors import LabError
-from labs.models.discrete import Discrete
-from labs.models.mechanisms import mechanism
 from labs.problems.optimal_control import (
-    Problem,
+    OptimalControlProblem,
     diverges_at,
-    expand,
-    gradient_norm,
     rollout,
     second_derivatives,
-    whole,
 )
-from labs.tasks.motion.cost import MotionCost, Reach
+from labs.resumable import run_to_completion
+from tests.labs.problems.random_problem import random_problem, simulate
 
 RNG = np.random.default_rng(4)
 
 
-def problem(name: str = "ur5", N: int = 6, method: str = "semi-implicit-euler") -> Problem:
-    m = mechanism(name)
-    n, k = m.nx, m.nu
-
-    def weight(size: int) -> np.ndarray:
-        half = RNG.normal(size=(size, size))
-        weight: np.ndarray = half @ half.T / size
-        return weight
-
-    cost = MotionCost(
-        N,
-        weight(n),
-        weight(k),
-        weight(n),
-        RNG.normal(size=(N + 1, n)),
-        RNG.normal(size=k),
-        Reach(m, np.array([0.1, 0.3, 0.5]), 7.0),
-    )
-    return Problem(Discrete(m, 0.02, method), cost, RNG.normal(size=n), N)
-
-
-def simulated(p: Problem, U: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    nothing = np.zeros((p.N, p.dynamics.nu, p.dynamics.nx))
-    return rollout(p, np.zeros((p.N + 1, p.dynamics.nx)), U, nothing)
-
-
 @pytest.mark.parametrize("name", ["cart-pole", "acrobot", "ur5"])
 def test_the_gradients_of_the_cost_are_those_of_finite_differences(name: str) -> None:
-    p = problem(name)
+    p = random_problem(RNG, name)
     X, U = RNG.normal(size=(7, p.dynamics.nx)), RNG.normal(size=(6, p.dynamics.nu))
     found, eps = p.cost.derivatives(X, U, exact=True), 1e-6
     for array, gradient in ((X, found.l_x), (U, found.l_u)):
@@ -64,7 +34,7 @@ def test_the_gradients_of_the_cost_are_those_of_finite_differences(name: str) ->
 
 
 def test_the_hessians_of_the_cost_are_those_of_finite_differences() -> None:
-    p = problem("ur5")
+    p = random_problem(RNG, "ur5")
     X, U = RNG.normal(size=(7, 12)), RNG.normal(size=(6, 6))
     found, eps = p.cost.derivatives(X, U, exact=True), 1e-5
     for t in (0, 3, 6):
@@ -81,7 +51,7 @@ def test_the_hessians_of_the_cost_are_those_of_finite_differences() -> None:
 
 
 def test_the_gauss_newton_hessian_is_never_indefinite() -> None:
-    p = problem("ur5")
+    p = random_problem(RNG, "ur5")
     X, U = RNG.normal(size=(7, 12)), RNG.normal(size=(6, 6))
     plain, exact = (p.cost.derivatives(X, U, exact) for exact in (False, True))
     assert np.linalg.eigvalsh(plain.l_xx[-1]).min() > -1e-9
@@ -93,10 +63,10 @@ def test_the_gauss_newton_hessian_is_never_indefinite() -> None:
 @pytest.mark.parametrize("name", ["pendulum", "cart-pole", "ur5"])
 def test_second_derivatives_are_those_of_the_dynamics(name: str, method: str) -> None:
     """Against second differences of the step itself, along random directions."""
-    p = problem(name, method=method)
+    p = random_problem(RNG, name, method=method)
     n, m = p.dynamics.nx, p.dynamics.nu
     X, U = RNG.normal(size=(7, n)), RNG.normal(size=(6, m))
-    second = whole(second_derivatives(p.dynamics, X, U))
+    second = run_to_completion(second_derivatives(p.dynamics, X, U))
     np.testing.assert_array_equal(second, second.transpose(0, 1, 3, 2))
     eps = 1e-3
     for t in range(6):
@@ -108,41 +78,9 @@ def test_second_derivatives_are_those_of_the_dynamics(name: str, method: str) ->
         np.testing.assert_allclose(found, by_difference, atol=2e-4 * scale)
 
 
-@pytest.mark.parametrize("name", ["cart-pole", "ur5"])
-def test_the_gradient_by_the_costate_is_that_of_finite_differences(name: str) -> None:
-    p, eps = problem(name), 1e-6
-    U = RNG.normal(size=(6, p.dynamics.nu))
-    X, _, _ = simulated(p, U)
-    slopes = np.empty_like(U)
-    for index in np.ndindex(U.shape):
-        moved = U.copy()
-        moved[index] += eps
-        ahead = simulated(p, moved)[2]
-        moved[index] -= 2 * eps
-        slopes[index] = (ahead - simulated(p, moved)[2]) / (2 * eps)
-    found = gradient_norm(p, whole(expand(p, X, U, second_order=False)), U)
-    assert found == pytest.approx(np.abs(slopes).max(), rel=1e-6)
-
-
-def test_a_gradient_that_pushes_against_the_bound_does_not_count() -> None:
-    p = problem("pendulum", N=1)
-    U = np.array([[0.0]])
-    X, _, J = simulated(p, U)
-    downhill = -np.sign(simulated(p, U + 1e-4)[2] - J)
-    U[0, 0] = downhill * 1e-3
-    X, U, _ = simulated(p, U)
-    model = whole(expand(p, X, U, second_order=False))
-    free = gradient_norm(p, model, U)
-    bounded = Problem(p.dynamics, p.cost, p.x0, 1, bound=np.array([1e-3]))
-    wider = Problem(p.dynamics, p.cost, p.x0, 1, bound=np.array([2e-3]))
-    assert free > 0.0
-    assert gradient_norm(wider, model, U) == free
-    assert gradient_norm(bounded, model, U) == 0.0
-
-
 def test_a_rollout_follows_the_policy_within_the_bound() -> None:
-    p = problem("cart-pole")
-    bounded = Problem(p.dynamics, p.cost, p.x0, p.N, bound=np.array([0.4]))
+    p = random_problem(RNG, "cart-pole")
+    bounded = OptimalControlProblem(p.dynamics, p.cost, p.x0, p.N, bound=np.array([0.4]))
     X, U, K = RNG.normal(size=(7, 4)), RNG.normal(size=(6, 1)), RNG.normal(size=(6, 1, 4))
     for which, limit in ((p, np.inf), (bounded, 0.4)):
         found_X, found_U, cost = rollout(which, X, U, K)
@@ -155,19 +93,19 @@ def test_a_rollout_follows_the_policy_within_the_bound() -> None:
 
 
 def test_a_diverging_rollout_costs_infinitely_much() -> None:
-    p = problem("cart-pole", N=60, method="explicit-euler")
+    p = random_problem(RNG, "cart-pole", N=60, method="explicit-euler")
     U = np.zeros((60, 1))
     U[3] = 1e9
-    X, _, cost = simulated(p, U)
+    X, _, cost = simulate(p, U)
     assert cost == np.inf
     assert 3 < diverges_at(X) <= 5
 
 
 def test_what_does_not_fit_is_said() -> None:
-    p = problem("cart-pole")
+    p = random_problem(RNG, "cart-pole")
     with pytest.raises(LabError, match="N = 0: a horizon has at least one step"):
-        Problem(p.dynamics, p.cost, p.x0, 0)
+        OptimalControlProblem(p.dynamics, p.cost, p.x0, 0)
     with pytest.raises(LabError, match=r"x_0 has shape \(3,\); this system takes \(4,\)"):
-        Problem(p.dynamics, p.cost, np.zeros(3), 5)
+        OptimalControlProblem(p.dynamics, p.cost, np.zeros(3), 5)
     with pytest.raises(LabError, match="takes 1 positive numbers"):
-        Problem(p.dynamics, p.cost, p.x0, 5, bound=np.array([-1.0]))
+        OptimalControlProblem(p.dynamics, p.cost, p.x0, 5, bound=np.array([-1.0]))

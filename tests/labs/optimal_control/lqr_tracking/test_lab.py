@@ -9,8 +9,9 @@ import pytest
 from labs.algorithms.periodic_lqr import Periodic
 from labs.engine.catalog import find
 from labs.engine.run import World
-from labs.optimal_control.lqr_tracking.lab import FARTHEST, LqrTracking, TrackingParams
-from labs.optimal_control.lqr_tracking.tracking import known, view
+from labs.optimal_control.lqr_tracking.lab import LARGEST_DEVIATION, LqrTracking
+from labs.optimal_control.lqr_tracking.params import TrackingParams
+from labs.optimal_control.lqr_tracking.tracking import full_preview, limited_preview
 from labs.params import Value
 from labs.scene import NullScene
 from tests.labs.experiments import Experiments
@@ -20,7 +21,9 @@ ARTICLE = Experiments("labs.optimal_control", "lqr_tracking")
 Channels = Mapping[str, np.ndarray]
 
 
-def after(seconds: float, setting: Mapping[str, Value], **changes: Value) -> tuple[World, Channels]:
+def recorded(
+    seconds: float, setting: Mapping[str, Value], **changes: Value
+) -> tuple[World, Channels]:
     """A world with what it recorded."""
     world = World(ENTRY, {**setting, **changes}, capacity=10_000)
     for _ in range(round(seconds / world.lab.period)):
@@ -29,13 +32,13 @@ def after(seconds: float, setting: Mapping[str, Value], **changes: Value) -> tup
     return world, world.recording().channels
 
 
-def turned(world: World) -> TrackingParams:
+def params_of(world: World) -> TrackingParams:
     """The parameters of a world of this lab."""
     assert isinstance(world.params, TrackingParams)
     return world.params
 
 
-def scalar(world: World, channel: str) -> float:
+def measured(world: World, channel: str) -> float:
     """What is measured now."""
     value = world.lab.measure(world.params, world.state)[channel]
     assert isinstance(value, float)
@@ -44,8 +47,8 @@ def scalar(world: World, channel: str) -> float:
 
 def lap_cost(setting: Mapping[str, Value], **changes: Value) -> float:
     """Of the robot, once settled."""
-    world, channels = after(12.0, setting, **changes)
-    assert world.t >= 2 * turned(world).lap_time
+    world, channels = recorded(12.0, setting, **changes)
+    assert world.t >= 2 * params_of(world).lap_time
     return float(channels["lap_cost"][-1])
 
 
@@ -64,8 +67,8 @@ def bill_of_the_linear_plant(lasting: Periodic) -> float:
 
 @ARTICLE.verify("The affine term carries the arm")
 def test_the_affine_term_carries_the_arm(setting: Mapping[str, Value]) -> None:
-    world, channels = after(9.0, setting)
-    last = slice(-turned(world).samples, None)
+    world, channels = recorded(9.0, setting)
+    last = slice(-params_of(world).samples, None)
     error, ghost = channels["error"][last], channels["ghost_error"][last]
     assert error.max() < 0.008
     assert (ghost.min(), ghost.max()) == pytest.approx((0.056, 0.0735), abs=5e-4)
@@ -76,13 +79,13 @@ def test_the_affine_term_carries_the_arm(setting: Mapping[str, Value]) -> None:
     assert np.abs(channels["feedback"][last, 1]).max() < 0.15 * np.abs(torque).max()
     gain = world.lab.fields(world.params, world.state)["K_position"]
     assert gain[1, 1] == pytest.approx(-300.0, rel=0.1)
-    _, cheaper = after(9.0, setting, effort_weight=0.1)
+    _, cheaper = recorded(9.0, setting, effort_weight=0.1)
     assert cheaper["error"][last].max() < 1e-4
 
 
 @ARTICLE.verify("A motion of the robot has no defect")
 def test_a_motion_has_no_defect(setting: Mapping[str, Value]) -> None:
-    _, channels = after(6.0, setting)
+    _, channels = recorded(6.0, setting)
     assert np.abs(channels["affine"]).max() < 0.4
     assert 28.0 < np.abs(channels["u"]).max() < 29.0
     assert channels["error"].max() < 1e-3
@@ -91,7 +94,7 @@ def test_a_motion_has_no_defect(setting: Mapping[str, Value]) -> None:
 
 @ARTICLE.verify("It moves before its reference does")
 def test_it_moves_before_its_reference_does(setting: Mapping[str, Value]) -> None:
-    world, channels = after(12.0, setting)
+    world, channels = recorded(12.0, setting)
     p, ghost, p_ref = (channels[name] for name in ("p", "p_ghost", "p_ref"))
     jump = 500
     assert (p_ref[jump - 1], p_ref[jump]) == pytest.approx((0.4, -0.4))
@@ -101,7 +104,7 @@ def test_it_moves_before_its_reference_does(setting: Mapping[str, Value]) -> Non
     lean = np.degrees(channels["q"][:, 1]) - 180.0
     assert lean[jump - 25] == pytest.approx(6.1, abs=0.1)
     assert np.abs(channels["u"]).max() < 3.0
-    blind, of_blind = after(12.0, setting, preview=0.0)
+    blind, of_blind = recorded(12.0, setting, preview=0.0)
     assert np.abs(of_blind["u"]).max() == pytest.approx(27.8, abs=0.1)
     np.testing.assert_array_equal(blind.state.x, blind.state.ghost)
     now = world.lab.measure(world.params, world.state)
@@ -115,26 +118,26 @@ def test_how_far_ahead_is_far_enough(setting: Mapping[str, Value]) -> None:
     costs = [lap_cost(setting, preview=n) for n in (0.0, 10.0, 20.0, 40.0, 60.0, 100.0)]
     np.testing.assert_allclose(costs, [4671, 3153, 1764, 802, 705, 702], atol=0.6)
     assert lap_cost(setting) == costs[2]
-    along = TrackingParams.model_validate(setting).setting
+    along = TrackingParams.model_validate(setting).settings
     steps_ahead = {10: 31.3, 40: 9.3, 58: 2.2}
     for ahead, force in steps_ahead.items():
-        np.testing.assert_allclose(view(along, 99 - ahead, 60).k, force, atol=0.1)
+        np.testing.assert_allclose(limited_preview(along, 99 - ahead, 60).k, force, atol=0.1)
 
 
 @ARTICLE.verify("A linear cost is another reference")
 def test_a_linear_cost_is_another_reference(setting: Mapping[str, Value]) -> None:
-    world, channels = after(12.0, setting)
+    world, channels = recorded(12.0, setting)
     assert channels["p"][-1] == pytest.approx(-0.1, abs=2e-3)
     assert abs(channels["p_ghost"][-1]) < 1e-9
     assert channels["lap_cost"][-1] == pytest.approx(-150.0, abs=0.1)
-    assert known(turned(world).setting).lap_cost == pytest.approx(-150.0, rel=1e-6)
-    _, priced = after(12.0, setting, lean=0.0, price=10.0)
+    assert full_preview(params_of(world).settings).lap_cost == pytest.approx(-150.0, rel=1e-6)
+    _, priced = recorded(12.0, setting, lean=0.0, price=10.0)
     assert 1e-5 < abs(priced["p"][-1]) < 1e-3
 
 
 @ARTICLE.verify("A wind it knows, a wind it does not")
 def test_winds_known_and_unknown(setting: Mapping[str, Value]) -> None:
-    world, channels = after(12.0, setting)
+    world, channels = recorded(12.0, setting)
     gain = world.lab.fields(world.params, world.state)["K_position"]
     assert gain[0, 0] == pytest.approx(34.8, abs=0.05)
     assert channels["p"][-1] == pytest.approx(-5.0 / gain[0, 0], rel=1e-4)
@@ -142,25 +145,25 @@ def test_winds_known_and_unknown(setting: Mapping[str, Value]) -> None:
     world.change({"wind_known": True})
     for _ in range(600):
         world.advance()
-    assert abs(scalar(world, "p")) < 1e-3
-    assert scalar(world, "p_ghost") == pytest.approx(-0.1436, abs=1e-4)
-    told = world.lab.measure(world.params, world.state)
-    np.testing.assert_allclose(told["affine"], -5.0, atol=0.02)
+    assert abs(measured(world, "p")) < 1e-3
+    assert measured(world, "p_ghost") == pytest.approx(-0.1436, abs=1e-4)
+    now = world.lab.measure(world.params, world.state)
+    np.testing.assert_allclose(now["affine"], -5.0, atol=0.02)
 
 
 @ARTICLE.verify("The bill is as foretold")
 def test_the_bill_is_as_foretold(setting: Mapping[str, Value]) -> None:
-    world, channels = after(9.0, setting)
-    lasting = known(turned(world).setting)
+    world, channels = recorded(9.0, setting)
+    lasting = full_preview(params_of(world).settings)
     foretold = lasting.lap_cost
     assert foretold == pytest.approx(10.72, abs=5e-3)
     assert bill_of_the_linear_plant(lasting) == pytest.approx(foretold, rel=1e-7)
     assert channels["lap_cost"][-1] == pytest.approx(foretold, rel=5e-4)
     assert channels["ghost_lap_cost"][-1] == pytest.approx(108.0, abs=0.5)
-    wide, wider = after(9.0, setting, stroke=0.4)
-    share = wider["lap_cost"][-1] / known(turned(wide).setting).lap_cost
+    wide, wider = recorded(9.0, setting, stroke=0.4)
+    share = wider["lap_cost"][-1] / full_preview(params_of(wide).settings).lap_cost
     assert share == pytest.approx(1.0 - 0.007, abs=5e-4)
-    _, laden = after(9.0, setting, payload=0.1)
+    _, laden = recorded(9.0, setting, payload=0.1)
     assert laden["lap_cost"][-1] == pytest.approx(10.44, abs=0.01)
 
 
@@ -173,28 +176,28 @@ def test_every_experiment_is_verified() -> None:
 
 @pytest.mark.parametrize("robot", ["ur5", "cart-pole"])
 def test_the_control_is_the_sum_of_its_parts(robot: str) -> None:
-    _, channels = after(1.0, {"robot": robot, "path": "square", "feed_forward": "gravity"})
+    _, channels = recorded(1.0, {"robot": robot, "path": "square", "feed_forward": "gravity"})
     parts = channels["feedback"] + channels["u_ref"] + channels["affine"]
     np.testing.assert_allclose(channels["u"], parts, atol=1e-12)
     assert np.abs(channels["affine"]).max() > 0.1
 
 
 def test_a_push_moves_both_and_both_come_back() -> None:
-    world, channels = after(3.0, {"feed_forward": "inverse-dynamics"})
+    world, channels = recorded(3.0, {"feed_forward": "inverse-dynamics"})
     world.press("push")
     for _ in range(10):
         world.advance()
-    hit = {name: scalar(world, name) for name in ("error", "ghost_error")}
+    hit = {name: measured(world, name) for name in ("error", "ghost_error")}
     for _ in range(290):
         world.advance()
     for name, error in hit.items():
         calm = channels[name][-1]
         assert error > 100.0 * calm
-        assert scalar(world, name) == pytest.approx(calm, rel=0.05), "two laps later"
+        assert measured(world, name) == pytest.approx(calm, rel=0.05), "two laps later"
 
 
 def test_costs_are_counted_anew_for_new_weights() -> None:
-    world, _ = after(4.0, {})
+    world, _ = recorded(4.0, {})
     assert "lap_paid" in world.lab.measure(world.params, world.state)
     world.change({"payload": 0.5})
     world.advance()
@@ -206,7 +209,7 @@ def test_costs_are_counted_anew_for_new_weights() -> None:
 
 
 def test_a_new_period_keeps_the_phase() -> None:
-    world, _ = after(1.0, {})
+    world, _ = recorded(1.0, {})
     before = world.lab.measure(world.params, world.state)
     world.change({"lap_time": 5.0})
     changed = world.lab.measure(world.params, world.state)
@@ -234,7 +237,7 @@ def test_who_is_lost_says_so_and_stops() -> None:
     assert world.trouble.startswith("Lost at t = ")
     assert "of the robot" in world.trouble
     q_ref = np.asarray(world.lab.measure(world.params, world.state)["q_ref"])
-    assert np.abs(world.state.x[:2] - q_ref).max() < FARTHEST
+    assert np.abs(world.state.x[:2] - q_ref).max() < LARGEST_DEVIATION
     world.reset()
     assert not world.trouble
 
@@ -242,7 +245,7 @@ def test_who_is_lost_says_so_and_stops() -> None:
 @pytest.mark.parametrize("robot", ["ur5", "cart-pole"])
 @pytest.mark.parametrize("steps", [0.0, 60.0])
 def test_what_is_in_view_is_drawn(robot: str, steps: float) -> None:
-    world, _ = after(0.2, {"robot": robot, "preview": steps, "wind": 3.0})
+    world, _ = recorded(0.2, {"robot": robot, "preview": steps, "wind": 3.0})
     scene = NullScene()
     world.lab.draw(scene, world.params, world.state)
     always = {"robot", "ghost", "reference", "past", "ghost's past", "goal", "size", "force"}

@@ -11,20 +11,18 @@ from labs.errors import LabError
 from labs.models.discrete import Discrete
 from labs.models.mechanisms import mechanism
 from labs.optimal_control.lqr_tracking.laps import (
-    METHOD,
+    CONTROL_PERIOD,
+    INTEGRATION_METHOD,
     PATHS,
     PLANES,
     Course,
-    H,
     lap,
     side_force,
-    tracked,
+    tracked_point,
 )
-from labs.optimal_control.lqr_tracking.tracking import CHOSEN, Setting, known, lap_of, view
 
 UR5 = Course("ur5", "circle", 0.15, 200)
 CART = Course("cart-pole", "circle", 0.4, 200)
-SETTING = Setting(replace(UR5, samples=60), "none", 0.0, (100.0, 1.0, 20.0), (3.0, -2.0))
 
 
 @pytest.mark.parametrize("name", PATHS)
@@ -70,7 +68,7 @@ def test_velocities_and_inverse_dynamics_are_those_of_the_motion(course: Course)
 
     def rate(row: np.ndarray) -> np.ndarray:
         one, two = (np.roll(row, -k, 0) - np.roll(row, k, 0) for k in (1, 2))
-        found: np.ndarray = (8.0 * one - two) / (12.0 * H)
+        found: np.ndarray = (8.0 * one - two) / (12.0 * CONTROL_PERIOD)
         return found
 
     np.testing.assert_allclose(rate(q), v, atol=2e-5)
@@ -92,7 +90,7 @@ def test_feed_forward_takes_gravity_or_nothing() -> None:
 def test_deviations_move_as_the_mechanism_does(course: Course, force: float) -> None:
     """c is exact; A and B are the derivatives, by central differences."""
     along, robot = lap(course, "gravity", force), mechanism(course.robot)
-    discrete = Discrete(robot, H, METHOD)
+    discrete = Discrete(robot, CONTROL_PERIOD, INTEGRATION_METHOD)
     for t in (0, 57, course.samples - 1):
         x, u = along.x_ref[t], along.u_ref[t]
         held = u + side_force(robot, x[: robot.nq], force)
@@ -109,7 +107,7 @@ def test_deviations_move_as_the_mechanism_does(course: Course, force: float) -> 
 def test_the_defect_says_how_far_the_reference_is_from_a_motion() -> None:
     """With inverse dynamics only the held control is left, which halves with the step; without,
     gravity's h M^-1 g."""
-    fine, coarse = (np.abs(lap(replace(UR5, samples=n)).c).max() / H for n in (400, 200))
+    fine, coarse = (np.abs(lap(replace(UR5, samples=n)).c).max() for n in (400, 200))
     assert fine < 0.6 * coarse
     assert np.abs(lap(UR5, "none").c).max() > 100 * np.abs(lap(UR5).c).max()
     jump = lap(replace(CART, path="square")).c
@@ -122,7 +120,7 @@ def test_the_defect_says_how_far_the_reference_is_from_a_motion() -> None:
 def test_a_side_force_does_its_work_at_what_is_tracked(course: Course) -> None:
     robot, rng = mechanism(course.robot), np.random.default_rng(0)
     q, v = lap(course).x_ref[30, : robot.nq], rng.standard_normal(robot.nq)
-    moved = (tracked(robot, q + 1e-6 * v) - tracked(robot, q - 1e-6 * v))[1] / 2e-6
+    moved = (tracked_point(robot, q + 1e-6 * v) - tracked_point(robot, q - 1e-6 * v))[1] / 2e-6
     power = side_force(robot, q, 9.0) @ v[list(robot.driven)]
     assert power == pytest.approx(9.0 * moved, rel=1e-6)
 
@@ -134,22 +132,3 @@ def test_wrong_courses_are_refused() -> None:
         lap(replace(UR5, path="spiral"))
     with pytest.raises(LabError, match="there are inverse-dynamics"):
         lap(UR5, "perfect")
-
-
-def test_the_costs_of_steps_add_up_to_the_problems() -> None:
-    rng = np.random.default_rng(1)
-    problem = known(SETTING).problem
-    x, u = rng.standard_normal((61, 12)), rng.standard_normal((60, 6))
-    paid = sum(view(SETTING, t, 0).cost(x[t], u[t]) for t in range(60))
-    last = x[-1] @ problem.q_final @ x[-1]
-    assert paid + last == pytest.approx(problem.cost(x, u))
-
-
-def test_weights_and_linear_costs_are_in_units_of_the_motors() -> None:
-    """At its limit a motor pays R, and with s = 1 twice 1 more."""
-    problem, limit = known(SETTING).problem, mechanism("ur5").control_limit
-    at_limit = limit * np.eye(6)[CHOSEN["ur5"]]
-    assert at_limit @ problem.r @ at_limit == pytest.approx(20.0)
-    assert problem.terms["s_linear"][0] @ at_limit == pytest.approx(-2.0)
-    assert problem.terms["q_linear"][0, 1] == 3.0
-    np.testing.assert_array_equal(view(SETTING, 5, 9).x_ref, lap_of(SETTING).x_ref[5])

@@ -1,4 +1,4 @@
-"""The motions to plan: their cost term by term, guesses, new time steps, and blows."""
+"""The motions to plan: their cost term by term, guesses, and new time steps."""
 
 import numpy as np
 import pinocchio as pin
@@ -8,15 +8,14 @@ from labs.errors import LabError
 from labs.models.mechanisms import mechanism
 from labs.tasks.motion.motions import (
     MOTIONS,
-    Weights,
+    MotionWeights,
     first_guess,
     motion_problem,
-    resampled,
-    struck,
-    tips,
+    resample,
+    tip_path,
 )
 
-WEIGHTS = Weights(goal=7.0, rest=5.0, posture=3.0, velocity=2.0, control=0.5)
+WEIGHTS = MotionWeights(goal=7.0, rest=5.0, posture=3.0, velocity=2.0, control=0.5)
 TARGET = np.array([0.4, 0.2, 0.3])
 
 
@@ -33,7 +32,7 @@ def test_the_cost_is_that_of_the_docstring(name: str) -> None:
     J = 0.0
     for x, u in zip(X[:-1], U, strict=True):
         J += h * 3.0 * ((x[:n] - before) ** 2).sum() + h * 2.0 * (x[n:] ** 2).sum()
-        J += h * 0.5 * (((u - held) / motion.size) ** 2).sum()
+        J += h * 0.5 * (((u - held) / motion.control_scale) ** 2).sum()
     off = X[-1, :n] - motion.goal if motion.goal else moved.tip(X[-1, :n]) - TARGET
     J += 7.0 * (off**2).sum() + 5.0 * (X[-1, n:] ** 2).sum()
     assert problem.cost.value(X, U) == pytest.approx(J)
@@ -51,7 +50,9 @@ def test_the_goal_of_a_swing_up_is_to_balance_upright(name: str) -> None:
 def test_the_size_of_a_pendulums_control_holds_it_level() -> None:
     level = {"pendulum": [np.pi / 2], "double-pendulum": [np.pi / 2, 0.0]}
     for name, q in level.items():
-        np.testing.assert_allclose(mechanism(name).holding(np.array(q)), MOTIONS[name].size)
+        np.testing.assert_allclose(
+            mechanism(name).holding(np.array(q)), MOTIONS[name].control_scale
+        )
 
 
 def test_the_first_guess_is_a_push_or_a_swing_within_the_bound() -> None:
@@ -69,26 +70,15 @@ def test_the_first_guess_is_a_push_or_a_swing_within_the_bound() -> None:
 
 def test_controls_fit_another_step_and_horizon() -> None:
     U = np.arange(4.0)[:, None]
-    np.testing.assert_array_equal(resampled(U, 0.02, 0.02, 4), U)
-    np.testing.assert_array_equal(resampled(U, 0.02, 0.02, 2), U[:2])
-    np.testing.assert_array_equal(
-        resampled(U, 0.02, 0.01, 10)[:, 0], [0, 0, 1, 1, 2, 2, 3, 3, 3, 3]
-    )
-    np.testing.assert_array_equal(resampled(U, 0.01, 0.02, 3)[:, 0], [1, 3, 3])
-
-
-@pytest.mark.parametrize("name", MOTIONS)
-def test_a_blow_is_a_strong_force_for_a_short_time(name: str) -> None:
-    moved = mechanism(name, 0.3)
-    q, impulse, short = moved.arm.home + 0.4, np.array([0.2, 0.5, -0.3]), 1e-8
-    torque = moved.tip_jacobian(q).T @ impulse / short
-    change = short * pin.aba(moved.model, moved.data, q, np.zeros(moved.nq), torque)
-    np.testing.assert_allclose(struck(moved, q, impulse), change, rtol=1e-5, atol=1e-6)
+    np.testing.assert_array_equal(resample(U, 0.02, 0.02, 4), U)
+    np.testing.assert_array_equal(resample(U, 0.02, 0.02, 2), U[:2])
+    np.testing.assert_array_equal(resample(U, 0.02, 0.01, 10)[:, 0], [0, 0, 1, 1, 2, 2, 3, 3, 3, 3])
+    np.testing.assert_array_equal(resample(U, 0.01, 0.02, 3)[:, 0], [1, 3, 3])
 
 
 def test_tips_follow_a_trajectory() -> None:
     moved = mechanism("pendulum")
-    path = tips(moved, np.array([[0.0, 9.0], [np.pi, 9.0]]))
+    path = tip_path(moved, np.array([[0.0, 9.0], [np.pi, 9.0]]))
     np.testing.assert_allclose(path, [[0.0, 0.0, 0.25], [0.0, 0.0, 1.25]], atol=1e-12)
 
 

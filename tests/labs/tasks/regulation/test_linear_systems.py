@@ -5,7 +5,7 @@ import pytest
 
 from labs.algorithms.stabilizability import hidden_modes
 from labs.errors import LabError
-from labs.tasks.regulation.linear_systems import STEP, SYSTEMS, linear_system
+from labs.tasks.regulation.linear_systems import LINEAR_SYSTEMS, SIMULATION_STEP, linear_system
 
 PERIODS = (0.01, 0.05, 0.2)
 
@@ -17,14 +17,14 @@ def test_the_mass_is_a_double_integrator(period: float) -> None:
     np.testing.assert_allclose(b, [[period**2 / 2], [period]], atol=1e-14)
 
 
-@pytest.mark.parametrize("name", SYSTEMS)
+@pytest.mark.parametrize("name", LINEAR_SYSTEMS)
 @pytest.mark.parametrize("period", PERIODS)
 def test_a_and_b_are_the_derivatives_of_the_simulation(name: str, period: float) -> None:
     """By central differences over as many steps as the world does in a period."""
     system = linear_system(name)
 
     def after(x: np.ndarray, u: np.ndarray) -> np.ndarray:
-        for _ in range(round(period / STEP)):
+        for _ in range(round(period / SIMULATION_STEP)):
             x = system.step(x, u)
         return x
 
@@ -38,12 +38,12 @@ def test_a_and_b_are_the_derivatives_of_the_simulation(name: str, period: float)
         np.testing.assert_allclose(column / (2 * eps), b[:, i], atol=1e-6)
 
 
-@pytest.mark.parametrize("name", SYSTEMS)
+@pytest.mark.parametrize("name", LINEAR_SYSTEMS)
 def test_it_rests_where_it_should_and_can_be_regulated(name: str) -> None:
     system = linear_system(name)
     np.testing.assert_allclose(system.step(system.x_eq, system.u_eq), system.x_eq, atol=1e-9)
     assert len(hidden_modes(*system.linear(0.02))) == 0
-    assert system.lost(system.x_eq) == ""
+    assert system.out_of_range(system.x_eq) == ""
 
 
 def test_upright_is_unstable_and_a_mass_is_not() -> None:
@@ -56,7 +56,7 @@ def test_a_force_on_the_tip_accelerates_the_mass() -> None:
     """f = 3 N along y for 10 ms on 1 kg; a force along z moves nothing."""
     system = linear_system("mass")
     x = system.step(system.x_eq, np.zeros(1), lambda tip: np.array([0.0, 3.0, 5.0]))
-    np.testing.assert_allclose(x, [3.0 * STEP**2 / 2, 3.0 * STEP], atol=1e-14)
+    np.testing.assert_allclose(x, [3.0 * SIMULATION_STEP**2 / 2, 3.0 * SIMULATION_STEP], atol=1e-14)
 
 
 def test_a_force_on_the_poles_tip_is_a_torque_about_its_hinge() -> None:
@@ -77,7 +77,7 @@ def test_a_force_on_the_poles_tip_is_a_torque_about_its_hinge() -> None:
     ],
 )
 def test_what_is_lost_says_why(name: str, x: list[float], why: str) -> None:
-    assert why in linear_system(name).lost(np.array(x))
+    assert why in linear_system(name).out_of_range(np.array(x))
 
 
 def test_wrong_names_and_periods_are_refused() -> None:

@@ -1,14 +1,16 @@
-"""From where a linear policy brings a nonlinear system back: rollouts of the closed loop.
+"""The region of attraction: from where a linear policy brings a nonlinear system back, by rollouts
+of the closed loop.
 
     x' = f(x, u),    u = clip(K_t (x - x_eq), limit), held for T,    K_t given for t = 0, 1, ...,
                                                                      M - 1 and then over again
 
 for the cart-pole, the pendulum and the mass on a line, whose rest needs no control (u_eq = 0).
-One turn of M periods maps dx, where it is small, to Phi dx. If Phi is stable, L = Phi' L Phi + I
-has a solution, and dx' L dx decreases from turn to turn. A rollout has recovered once it is in the
-largest ellipsoid dx' L dx <= c in which nothing leans by more than CLOSE, no limit is met and
-no rail ends all through a turn; it is lost at the rail's end, beyond two turns round, or if it
-takes longer than PATIENCE. Integrated by RK4 as in `linear_systems.py`, in closed form.
+One cycle of M periods maps dx, where it is small, to Phi dx. If Phi is stable, the Lyapunov
+equation L = Phi' L Phi + I has a solution, and dx' L dx decreases from cycle to cycle. A rollout
+has recovered once it is in the largest ellipsoid dx' L dx <= c in which no angle exceeds
+SMALL_ANGLE, no limit is met and no rail ends all through a cycle: an invariant set. It has not
+at the rail's end, beyond two turns round, or if it takes longer than TIME_LIMIT. Integrated by
+RK4 as in `linear_systems.py`, in closed form.
 """
 
 from collections.abc import Mapping
@@ -20,23 +22,23 @@ from scipy.linalg import solve_discrete_lyapunov
 
 from labs.compiled import compiled
 from labs.models import cart_pole, mass_on_a_line, pendulums
-from labs.tasks.regulation.linear_systems import STEP, linear_system
+from labs.tasks.regulation.linear_systems import SIMULATION_STEP, linear_system
 
-CLOSE = 0.1
+SMALL_ANGLE = 0.1
 """[rad] near enough to the rest for the linear map to hold."""
-PATIENCE = 20.0
-"""[s]"""
-POINTS = 41
-"""Along either axis of the plane."""
+TIME_LIMIT = 20.0
+"""[s] of a rollout."""
+GRID_POINTS = 41
+"""Along either axis of the phase plane."""
 GRAVITY = 9.81
 
-SPAN: Mapping[str, tuple[float, float]] = {
+HALF_WIDTHS: Mapping[str, tuple[float, float]] = {
     "cart-pole": (1.2, 8.0),
     "pendulum": (pi, 12.0),
     "mass": (1.5, 5.0),
 }
-"""The plane's half widths: of the coordinate [rad; m] and of its rate."""
-CODES: Mapping[str, int] = {"mass": 0, "pendulum": 1, "cart-pole": 2}
+"""Of the phase plane: of the coordinate [rad; m] and of its rate."""
+SYSTEM_CODES: Mapping[str, int] = {"mass": 0, "pendulum": 1, "cart-pole": 2}
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +46,7 @@ class ClosedLoop:
     """A system under a linear policy."""
 
     system: str
-    """One of CODES."""
+    """One of SYSTEM_CODES."""
     period: float
     """T [s]."""
     gains: np.ndarray
@@ -52,7 +54,7 @@ class ClosedLoop:
     limit: float
     """[N; N m], may be infinite."""
 
-    def turn(self) -> np.ndarray:
+    def transition(self) -> np.ndarray:
         """Phi (M + 1, nx, nx): dx after t periods is Phi_t dx, where dx is small."""
         a, b = linear_system(self.system).linear(self.period)
         phi = [np.eye(len(a))]
@@ -60,9 +62,9 @@ class ClosedLoop:
             phi.append((a + b @ gain[None]) @ phi[-1])
         return np.array(phi)
 
-    def haven(self) -> tuple[np.ndarray, float]:
-        """L and c of the ellipsoid around the rest; c = -1 where the loop is unstable there."""
-        system, phi = linear_system(self.system), self.turn()
+    def invariant_ellipsoid(self) -> tuple[np.ndarray, float]:
+        """L (nx, nx) and c of dx' L dx <= c; c = -1 where the loop is unstable at its rest."""
+        system, phi = linear_system(self.system), self.transition()
         n = system.nx
         with np.errstate(all="ignore"):
             radius = np.abs(np.linalg.eigvals(phi[-1])).max() if np.isfinite(phi).all() else np.inf
@@ -72,7 +74,7 @@ class ClosedLoop:
         controls = np.einsum("ti,tij->tj", self.gains, phi[:-1])
         bounded = [(controls, self.limit)]
         for i in range(system.mechanism.nq):
-            bounded.append((phi[:, i], system.reach if i in system.sliding else CLOSE))
+            bounded.append((phi[:, i], system.half_rail if i in system.prismatic else SMALL_ANGLE))
         inverse = np.linalg.inv(shape)
         level = np.inf
         for rows, bound in bounded:
@@ -83,70 +85,70 @@ class ClosedLoop:
     def recovers(self, deviations: np.ndarray) -> np.ndarray:
         """Which of the deviations dx (k, nx) from the rest are brought back, (k,) bool."""
         system = linear_system(self.system)
-        shape, level = self.haven()
+        shape, level = self.invariant_ellipsoid()
         starts = np.ascontiguousarray(deviations, float)
-        back = np.zeros(len(starts), np.bool_)
+        recovered = np.zeros(len(starts), np.bool_)
         if level > 0.0:
-            _judge(
-                CODES[self.system],
+            _simulate(
+                SYSTEM_CODES[self.system],
                 starts,
                 system.x_eq,
                 np.ascontiguousarray(self.gains),
                 self.limit,
                 shape,
                 level,
-                system.reach,
-                round(self.period / STEP),
-                round(PATIENCE / self.period),
-                back,
+                system.half_rail,
+                round(self.period / SIMULATION_STEP),
+                round(TIME_LIMIT / self.period),
+                recovered,
             )
-        return back
+        return recovered
 
-    def from_plane(self, points: np.ndarray) -> np.ndarray:
-        """Deviations (k, nx) from points (k, 2) of the plane: coordinate and rate, all else at
-        rest."""
+    def from_phase_plane(self, points: np.ndarray) -> np.ndarray:
+        """Deviations (k, nx) from points (k, 2) of the phase plane: a coordinate and its rate, all
+        else at rest."""
         n = linear_system(self.system).mechanism.nq
         dx = np.zeros((len(points), 2 * n))
         dx[:, [n - 1, 2 * n - 1]] = points
         return dx
 
     def recovers_in_row(self, row: int) -> np.ndarray:
-        """Which points of this row of the plane's grid are brought back, (POINTS,) bool."""
-        places, speeds = axes(self.system)
-        points = np.column_stack([places, np.full(POINTS, speeds[row])])
-        return self.recovers(self.from_plane(points))
+        """Which points of this row of the plane's grid are brought back, (GRID_POINTS,) bool."""
+        places, speeds = grid_axes(self.system)
+        points = np.column_stack([places, np.full(GRID_POINTS, speeds[row])])
+        return self.recovers(self.from_phase_plane(points))
 
-    def largest_lean(self) -> float:
-        """The largest deviation [rad; m] from which it comes back from rest, and from all smaller
-        ones alike, to a thousandth of the plane's width; zero if from none."""
-        low, high = 0.0, SPAN[self.system][0]
+    def largest_recoverable_deviation(self) -> float:
+        """The largest deviation [rad; m] from which it comes back, released at rest, and from all
+        smaller ones alike, to a thousandth of the plane's width; zero if from none."""
+        low, high = 0.0, HALF_WIDTHS[self.system][0]
         for _ in range(2):
             tried = np.linspace(low, high, 41)
             still = np.column_stack([tried, np.zeros_like(tried)])
-            lost = ~self.recovers(self.from_plane(still))
-            lost[0] = False
-            if not lost.any():
+            fails = ~self.recovers(self.from_phase_plane(still))
+            fails[0] = False
+            if not fails.any():
                 return high
-            first = int(np.argmax(lost))
+            first = int(np.argmax(fails))
             low, high = tried[first - 1], tried[first]
         return float(low)
 
 
-def axes(system: str) -> tuple[np.ndarray, np.ndarray]:
-    """The plane's grid: coordinates (POINTS,) and rates (POINTS,), of deviations."""
-    wide, fast = SPAN[system]
-    return np.linspace(-wide, wide, POINTS), np.linspace(-fast, fast, POINTS)
+def grid_axes(system: str) -> tuple[np.ndarray, np.ndarray]:
+    """The grid of the phase plane, of deviations: coordinates and rates, (GRID_POINTS,) each."""
+    coordinate, rate = (np.linspace(-most, most, GRID_POINTS) for most in HALF_WIDTHS[system])
+    return coordinate, rate
 
 
-def rates(system: str, x: np.ndarray, u: float) -> np.ndarray:
+def state_derivative(system: str, x: np.ndarray, u: float) -> np.ndarray:
     """x' (nx,) in closed form."""
     dx = np.zeros_like(x)
-    _rates(CODES[system], x, u, dx)
+    _state_derivative(SYSTEM_CODES[system], x, u, dx)
     return dx
 
 
 @compiled
-def _rates(code: int, x: np.ndarray, u: float, dx: np.ndarray) -> None:
+def _state_derivative(code: int, x: np.ndarray, u: float, dx: np.ndarray) -> None:
     """x' = f(x, u) into dx."""
     n = len(x) // 2
     for i in range(n):
@@ -170,54 +172,54 @@ def _rates(code: int, x: np.ndarray, u: float, dx: np.ndarray) -> None:
 
 
 @compiled
-def _judge(
+def _simulate(
     code: int,
     starts: np.ndarray,
-    rest: np.ndarray,
+    x_eq: np.ndarray,
     gains: np.ndarray,
     limit: float,
     shape: np.ndarray,
     level: float,
-    reach: float,
-    steps: int,
-    most: int,
-    back: np.ndarray,
+    half_rail: float,
+    substeps: int,
+    periods: int,
+    recovered: np.ndarray,
 ) -> None:
-    """One rollout for each start (k, nx), its verdict into back (k,)."""
-    n = len(rest)
+    """One rollout for each start (k, nx), its outcome into recovered (k,)."""
+    n = len(x_eq)
     k1, k2, k3, k4 = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
     y, dx = np.zeros(n), np.zeros(n)
     for which in range(len(starts)):
-        x = rest + starts[which]
-        for tick in range(most):
-            dx[:] = x - rest
-            turn = tick % len(gains)
-            if turn == 0:
+        x = x_eq + starts[which]
+        for tick in range(periods):
+            dx[:] = x - x_eq
+            index = tick % len(gains)
+            if index == 0:
                 size = 0.0
                 for i in range(n):
                     for j in range(n):
                         size += dx[i] * shape[i, j] * dx[j]
                 if size <= level:
-                    back[which] = True
+                    recovered[which] = True
                     break
             u = 0.0
             for i in range(n):
-                u += gains[turn, i] * dx[i]
+                u += gains[index, i] * dx[i]
             u = min(max(u, -limit), limit)
-            for _ in range(steps):
-                _rates(code, x, u, k1)
+            for _ in range(substeps):
+                _state_derivative(code, x, u, k1)
                 for i in range(n):
-                    y[i] = x[i] + 0.5 * STEP * k1[i]
-                _rates(code, y, u, k2)
+                    y[i] = x[i] + 0.5 * SIMULATION_STEP * k1[i]
+                _state_derivative(code, y, u, k2)
                 for i in range(n):
-                    y[i] = x[i] + 0.5 * STEP * k2[i]
-                _rates(code, y, u, k3)
+                    y[i] = x[i] + 0.5 * SIMULATION_STEP * k2[i]
+                _state_derivative(code, y, u, k3)
                 for i in range(n):
-                    y[i] = x[i] + STEP * k3[i]
-                _rates(code, y, u, k4)
+                    y[i] = x[i] + SIMULATION_STEP * k3[i]
+                _state_derivative(code, y, u, k4)
                 for i in range(n):
-                    x[i] += STEP / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+                    x[i] += SIMULATION_STEP / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
             slid = x[0] if code != 1 else 0.0
-            turned = x[n // 2 - 1] - rest[n // 2 - 1] if code != 0 else 0.0
-            if not (abs(slid) <= reach and abs(turned) <= 4.0 * np.pi):
+            turned = x[n // 2 - 1] - x_eq[n // 2 - 1] if code != 0 else 0.0
+            if not (abs(slid) <= half_rail and abs(turned) <= 4.0 * np.pi):
                 break

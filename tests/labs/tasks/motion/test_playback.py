@@ -1,4 +1,4 @@
-"""A policy on the plant: against the plan itself, and against a loop written out."""
+"""A plan on the plant: against the plan itself, and against a loop written out."""
 
 import numpy as np
 import pytest
@@ -6,35 +6,35 @@ import pytest
 from labs.algorithms.integrators import rk4
 from labs.models.discrete import Discrete
 from labs.models.mechanisms import Mechanism, mechanism
-from labs.tasks.motion.runs import (
-    FASTEST,
+from labs.tasks.motion.playback import (
     FEEDBACK,
+    LARGEST_VELOCITY,
     OPEN_LOOP,
-    QUANTUM,
-    Policy,
-    Runs,
-    advance,
-    begin,
-    kicked,
+    SUBSTEP,
+    Plan,
+    Playback,
+    advance_playback,
+    jump_states,
+    start_playback,
 )
 
 
-def policy(name: str, h: float, N: int = 12) -> Policy:
+def random_plan(name: str, h: float, N: int = 12) -> Plan:
     moved, rng = mechanism(name), np.random.default_rng(2)
     U = rng.normal(size=(N, moved.nu))
     X = Discrete(moved, h, "rk4").rollout(np.zeros(moved.nx), U)
-    return Policy(X, U, rng.normal(size=(N, moved.nu, moved.nx)), h)
+    return Plan(X, U, rng.normal(size=(N, moved.nu, moved.nx)), h)
 
 
-def play(plan: Policy, plant: Mechanism, quanta: int = 2, **changes: np.ndarray) -> Runs:
-    runs, held = begin(plan), np.zeros(plant.nu)
+def play(plan: Plan, plant: Mechanism, substeps: int = 2, **changes: np.ndarray) -> Playback:
+    runs, held = start_playback(plan), np.zeros(plant.nu)
     while not runs.finished(plan):
-        runs = advance(plan, runs, (plant.acceleration(held), held), quanta, **changes)
+        runs = advance_playback(plan, runs, (plant.acceleration(held), held), substeps, **changes)
     return runs
 
 
 def test_at_the_plans_own_step_both_runs_are_the_plan() -> None:
-    plan = policy("double-pendulum", QUANTUM)
+    plan = random_plan("double-pendulum", SUBSTEP)
     runs = play(plan, mechanism("double-pendulum"))
     for run in (FEEDBACK, OPEN_LOOP):
         np.testing.assert_array_equal(runs.X[run], plan.X)
@@ -43,12 +43,12 @@ def test_at_the_plans_own_step_both_runs_are_the_plan() -> None:
 
 
 @pytest.mark.parametrize("h", [0.005, 0.01, 0.04])
-@pytest.mark.parametrize("quanta", [1, 2, 7])
-def test_runs_are_those_of_a_loop_written_out(h: float, quanta: int) -> None:
-    """On another plant, with a limit and a disturbance; however many quanta go at once."""
-    plan, plant = policy("cart-pole", h), mechanism("cart-pole", 0.4, 0.2)
+@pytest.mark.parametrize("substeps", [1, 2, 7])
+def test_runs_are_those_of_a_loop_written_out(h: float, substeps: int) -> None:
+    """On another plant, with a limit and a disturbance; however many substeps go at once."""
+    plan, plant = random_plan("cart-pole", h), mechanism("cart-pole", 0.4, 0.2)
     limit, disturbance = np.array([0.8]), np.array([0.3])
-    runs = play(plan, plant, quanta, bound=limit, disturbance=disturbance)
+    runs = play(plan, plant, substeps, bound=limit, disturbance=disturbance)
     assert np.abs(runs.U[FEEDBACK] - runs.U[OPEN_LOOP]).max() > 1e-3, "K does something"
     for run, K in ((FEEDBACK, plan.K), (OPEN_LOOP, 0.0 * plan.K)):
         x = plan.X[0]
@@ -57,13 +57,13 @@ def test_runs_are_those_of_a_loop_written_out(h: float, quanta: int) -> None:
             np.testing.assert_allclose(runs.X[run, k], x, atol=1e-12)
             np.testing.assert_allclose(runs.U[run, k], u, atol=1e-12)
             a = plant.acceleration(u + disturbance)
-            for _ in range(round(h / QUANTUM)):
-                x = np.concatenate(rk4(a, x[:2], x[2:], QUANTUM))
+            for _ in range(round(h / SUBSTEP)):
+                x = np.concatenate(rk4(a, x[:2], x[2:], SUBSTEP))
         np.testing.assert_allclose(runs.X[run, -1], x, atol=1e-12)
 
 
 def test_noise_enters_through_the_feedback_alone() -> None:
-    plan, plant = policy("pendulum", 0.01), mechanism("pendulum")
+    plan, plant = random_plan("pendulum", 0.01), mechanism("pendulum")
     noise = np.array([[0.1, -0.2], [9.0, 9.0]])  # between ticks nobody looks
     runs = play(plan, plant, 2, noise=noise)
     np.testing.assert_allclose(runs.X[OPEN_LOOP], plan.X, atol=1e-6)
@@ -71,25 +71,25 @@ def test_noise_enters_through_the_feedback_alone() -> None:
 
 
 def test_a_blow_changes_both() -> None:
-    plan = policy("pendulum", 0.01)
-    runs = kicked(begin(plan), np.array([[0.0, 1.0], [0.0, 2.0]]))
+    plan = random_plan("pendulum", 0.01)
+    runs = jump_states(start_playback(plan), np.array([[0.0, 1.0], [0.0, 2.0]]))
     np.testing.assert_array_equal(runs.x, plan.X[0] + [[0.0, 1.0], [0.0, 2.0]])
 
 
 def test_a_run_that_diverges_stops_alone() -> None:
-    plan, plant = policy("pendulum", 0.01, N=40), mechanism("pendulum")
-    wild = Policy(plan.X, plan.U, np.full_like(plan.K, 1e6), plan.h)
+    plan, plant = random_plan("pendulum", 0.01, N=40), mechanism("pendulum")
+    wild = Plan(plan.X, plan.U, np.full_like(plan.K, 1e6), plan.h)
     noise = np.full((2, 2), 1e-3)
     runs = play(wild, plant, 2, noise=noise)
-    np.testing.assert_array_equal(runs.lost, [True, False])
-    assert np.abs(runs.x[:, 1]).max() <= FASTEST
+    np.testing.assert_array_equal(runs.diverged, [True, False])
+    assert np.abs(runs.x[:, 1]).max() <= LARGEST_VELOCITY
     np.testing.assert_allclose(runs.X[OPEN_LOOP], plan.X, atol=1e-6)
 
 
 def test_advancing_leaves_what_was_alone() -> None:
-    plan, plant = policy("pendulum", 0.01), mechanism("pendulum")
-    runs, held = begin(plan), np.zeros(1)
-    before = [a.copy() for a in (runs.x, runs.u, runs.X, runs.U, runs.lost)]
-    advance(plan, runs, (plant.acceleration(held), held), 4)
-    for a, b in zip(before, (runs.x, runs.u, runs.X, runs.U, runs.lost), strict=True):
+    plan, plant = random_plan("pendulum", 0.01), mechanism("pendulum")
+    runs, held = start_playback(plan), np.zeros(1)
+    before = [a.copy() for a in (runs.x, runs.u, runs.X, runs.U, runs.diverged)]
+    advance_playback(plan, runs, (plant.acceleration(held), held), 4)
+    for a, b in zip(before, (runs.x, runs.u, runs.X, runs.U, runs.diverged), strict=True):
         np.testing.assert_array_equal(a, b)

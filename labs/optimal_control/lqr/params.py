@@ -1,0 +1,96 @@
+"""The tunables of the regulator, its weights and its world."""
+
+import numpy as np
+
+from labs.optimal_control.lqr.region_of_attraction import ClosedLoop
+from labs.optimal_control.lqr.regulator import (
+    FINAL_WEIGHTS,
+    LQR_POLICIES,
+    Regulator,
+    RegulatorSettings,
+    regulator,
+)
+from labs.params import Group, Params
+from labs.tasks.regulation.linear_systems import LINEAR_SYSTEMS, LinearSystem, linear_system
+
+PERIODS = {0.01: "10 ms", 0.02: "20 ms", 0.05: "50 ms", 0.1: "100 ms", 0.2: "200 ms"}
+
+SYSTEM = Group("System", effect="restart")
+WEIGHTS = Group("Weights", effect="solve")
+HORIZON = Group("Horizon", effect="solve")
+WORLD = Group("World", effect="solve")
+
+
+class LqrParams(Params):
+    """What the user can turn."""
+
+    system: str = SYSTEM.choice("cart-pole", LINEAR_SYSTEMS, "System")
+    """What is to be kept at rest."""
+    deviation: float = SYSTEM.knob(
+        0.3, -3.2, 3.2, "\\Delta x_0", "rad, m", "Start off by", step=0.01
+    )
+    """Of the pole, the pendulum, the mass, or every joint of the UR5, at rest."""
+    period: float = SYSTEM.choice(0.02, PERIODS, "Time step", "T", "s", effect="solve")
+    """From t to t + 1: the policy looks once in a step and holds its control."""
+    q_slide: float = WEIGHTS.knob(10.0, 0.0, 10_000.0, "q_p", "1/m²", "Position", scale="log")
+    """Q's weight of what slides: the cart, the mass."""
+    q_turn: float = WEIGHTS.knob(10.0, 0.0, 10_000.0, "q_\\theta", "1/rad²", "Angle", scale="log")
+    """Q's weight of what turns: the pole, the pendulum, each joint of the UR5."""
+    q_slide_rate: float = WEIGHTS.knob(
+        1.0, 0.0, 1000.0, "q_{\\dot p}", "s²/m²", "Velocity", scale="log"
+    )
+    """Q's weight of the velocity of what slides."""
+    q_turn_rate: float = WEIGHTS.knob(
+        1.0, 0.0, 1000.0, "q_{\\dot\\theta}", "s²/rad²", "Angular velocity", scale="log"
+    )
+    """Q's weight of the velocity of what turns."""
+    r: float = WEIGHTS.knob(0.1, 1e-4, 1e4, "r", "1/N², 1/(N·m)²", "Control", scale="log")
+    """R = r I: what force or torque costs."""
+    policy: str = HORIZON.choice("steady", LQR_POLICIES, "Policy")
+    """The steady state's gain for ever, or those of N steps: all in turn and then over again, or
+    the first of them at every step."""
+    horizon: float = HORIZON.knob(100.0, 1.0, 300.0, "N", "", "Horizon", step=1.0)
+    """Steps over which the cost is summed up."""
+    final: str = HORIZON.choice("q", FINAL_WEIGHTS, "Final weight", "Q_f")
+    """What the final weight is a multiple of."""
+    alpha: float = HORIZON.knob(1.0, 0.0, 1000.0, "\\alpha", "", "Its scale", scale="log")
+    """How many times as much; with 0 it does not matter where x ends."""
+    limits: bool = WORLD.toggle(True, "Limits")
+    """Cut every control to what the motor can give. The regulator knows of none."""
+    limit: float = WORLD.knob(
+        20.0, 0.5, 200.0, "u_{max}", "N, N·m", "Strongest control", scale="log"
+    )
+    """Of the cart, the pendulum and the mass; the UR5's joints have motors of their own."""
+    push_force: float = WORLD.knob(
+        1.0, 0.0, 200.0, "f_{push}", "N", "Push force", scale="log", effect="live"
+    )
+    """On the tip, along +y, while a push lasts, 0.2 s."""
+
+    @property
+    def linear_system(self) -> LinearSystem:
+        return linear_system(self.system)
+
+    @property
+    def settings(self) -> RegulatorSettings:
+        weights = (self.q_slide, self.q_turn, self.q_slide_rate, self.q_turn_rate)
+        return RegulatorSettings(
+            self.system, self.period, weights, self.r, round(self.horizon), self.final,
+            self.alpha, self.policy,
+        )  # fmt: skip
+
+    @property
+    def regulator(self) -> Regulator:
+        return regulator(self.settings)
+
+    @property
+    def control_limit(self) -> np.ndarray:
+        """(nu,) [N; N m]: what the motors can give, limited or not."""
+        system = self.linear_system
+        own = system.mechanism.control_limit
+        return own if self.system == "ur5" else np.full(system.nu, self.limit)
+
+    @property
+    def closed_loop(self) -> ClosedLoop:
+        """The loop whose region of attraction is sought; not for the UR5."""
+        limit = self.limit if self.limits else np.inf
+        return ClosedLoop(self.system, self.period, self.regulator.gains[:, 0], limit)

@@ -1,0 +1,42 @@
+"""The regulated system in its scene."""
+
+import numpy as np
+
+from labs.optimal_control.lqr.params import LqrParams
+from labs.scene import Scene
+
+ARROW_SCALE, LONGEST_ARROW = 0.04, 0.6
+"""[m/N] length of a force's arrow, up to so many [m]."""
+
+
+def draw_regulated(
+    scene: Scene, params: LqrParams, x: np.ndarray, u: np.ndarray, force: np.ndarray
+) -> None:
+    """The system at x under the control u and a force on its tip, with a ghost at its rest."""
+    system = params.linear_system
+    mechanism, arm = system.mechanism, system.mechanism.arm
+    q, rest = x[: mechanism.nq], system.x_eq[: mechanism.nq]
+    scene.camera(*system.camera)
+    scene.arm("rest", arm, rest, ghost=True)
+    effort = np.abs(u) / params.control_limit if params.system == "ur5" else None
+    scene.arm("system", arm, q, effort=effort)
+    tip = mechanism.tip(q)
+    scene.handle("pull", tip, 0.05)
+    if force.any():
+        scene.arrow("force", tip, tip + _arrow(force))
+    if params.system in ("cart-pole", "mass"):
+        start = np.array([0.0, q[0], tip[2] if params.system == "mass" else arm.camera[1][2]])
+        push = _arrow(np.array([0.0, u[0], 0.0]))
+        if np.abs(push).max() > 1e-3:
+            scene.arrow("control", start, start + push, "actual")
+
+
+def clip_norm(vector: np.ndarray, longest: float) -> np.ndarray:
+    """The vector, shortened to this length where it is longer."""
+    length = float(np.linalg.norm(vector))
+    return vector if length <= longest else vector * (longest / length)
+
+
+def _arrow(force: np.ndarray) -> np.ndarray:
+    """[m] the arrow of a force (3,) [N]."""
+    return clip_norm(ARROW_SCALE * force, LONGEST_ARROW)

@@ -1,0 +1,204 @@
+"""One live session's loop, which alone touches the world, the scene and the panel. Everything the
+user does reaches it through the mailbox, and is read once a frame."""
+
+import contextlib
+import functools
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import viser
+
+from labs.engine.catalog import find
+from labs.engine.run import World
+from labs.engine.solution import Solution
+from labs.errors import LabError
+from server.broadcast import FRAME, Broadcast, Controls
+from server.mailbox import Item, Mailbox
+from server.messages import View
+from server.pacing import Pacer
+from server.panel import Panel
+from server.pipe import CONTROL, Link
+from server.solver_clock import SolverClock
+from server.viser_scene import ViserScene
+
+BUSY = 0.8 * FRAME
+"""[s] What the world, and then the solver, may compute in a frame."""
+
+log = logging.getLogger("orclab.worker")
+
+
+class LiveSession:
+    """The session's loop. `opening` is what the web process keeps of a session: lab, params, seed,
+    view, running, speed, and the solver's last status."""
+
+    def __init__(
+        self, link: Link, mailbox: Mailbox, server: viser.ViserServer, opening: dict[str, Any]
+    ) -> None:
+        self.link, self.mailbox = link, mailbox
+        self.world = World(find(opening["lab"]), opening["params"], opening["seed"])
+        self.controls = Controls(self.world, opening["running"], View(**opening["view"]))
+        self.pacer = Pacer(self.world, opening["speed"])
+        self.solver = SolverClock(self.world, opening["solver"])
+        self.scene = ViserScene(server, mailbox, self.controls.view)
+        self.panel = Panel(server, mailbox, self.world)
+        self.broadcast = Broadcast(link, self.scene, self.controls, self.pacer, self.solver)
+
+    def loop(self) -> None:
+        """Mail, world, solver, viewers; for ever. Any other order would show a stale state."""
+        while True:
+            wake = self.broadcast.next_wake(time.perf_counter())
+            for item in self.mailbox.take(wake - time.perf_counter()):
+                self._dispatch(item)
+            now = time.perf_counter()
+            self.broadcast.note_wake(now - wake)
+            with self._guard():
+                if self.controls.moving:
+                    self.pacer.advance(now, until=now + BUSY)
+                if not self.controls.failure:
+                    self.solver.iterate(now, until=now + BUSY)
+            with self._guard():
+                self.broadcast.send_samples(now)
+            with self._guard():
+                self.broadcast.draw(now)
+            self.broadcast.send_due_status(now)
+
+    # What the user does -----------------------------------------------------------------------
+
+    def _dispatch(self, item: Item) -> None:
+        error = ""
+        answer: Any = None
+        try:
+            if item.do.startswith("solver_"):
+                self.solver.dispatch(item.do.removeprefix("solver_"), **item.arguments)
+            else:
+                answer = getattr(self, f"_do_{item.do}")(**item.arguments)
+        except LabError as refused:
+            error = str(refused)
+            self.panel.show(self.world.params)  # puts a refused value back
+        except Exception as broken:
+            error = self._fail(broken)
+        if item.ref is not None:
+            # The status goes first: who has the answer finds the session as it is now.
+            self.broadcast.send_status(time.perf_counter())
+            self.link.send(CONTROL, {"ref": item.ref, "answer": answer, "error": error})
+        self.broadcast.request_update()
+
+    def _do_params(self, changes: dict[str, Any]) -> dict[str, Any]:
+        runs = self.world.runs
+        self.world.change(changes)
+        self._changed(restarted=self.world.runs != runs)
+        return self.world.params.model_dump()
+
+    def _do_apply(self, params: dict[str, Any], restart: bool) -> dict[str, Any]:
+        defaults = self.world.lab.Params().model_dump()
+        answer = self._do_params(defaults | params)
+        if restart:
+            self._do_reset()
+            self._do_run()
+            if self.world.lab.has_solver():
+                self.solver.dispatch("run")
+        return answer
+
+    def _do_run(self) -> None:
+        self.controls.running = True
+        self.pacer.anchor()
+
+    def _do_pause(self) -> None:
+        self.controls.running = False
+
+    def _do_step(self, count: int) -> None:
+        self.controls.running = False
+        for _ in range(count):
+            self.world.advance()
+
+    def _do_reset(self) -> None:
+        self._restart(self.world.seed)
+
+    def _do_seed(self, seed: int) -> None:
+        self._restart(seed)
+
+    def _restart(self, seed: int) -> None:
+        self.controls.failure = ""
+        self.world.reset(seed)
+        self._changed(restarted=True)
+
+    def _do_speed(self, factor: float) -> None:
+        self.pacer.speed = factor
+        self.pacer.anchor()
+
+    def _do_press(self, action: str) -> None:
+        self.world.press(action)
+
+    def _do_hold(self, handle: str, point: tuple[float, float, float] | None) -> None:
+        runs = self.world.runs
+        self.world.hold(handle, point)
+        self._changed(restarted=self.world.runs != runs)
+
+    def _do_load(self, path: str) -> dict[str, Any]:
+        """Takes up a saved solution; the solver waits then."""
+        self.world.load(Solution.read(Path(path).read_bytes()))
+        self.controls.failure = ""
+        self.solver.dispatch("pause")
+        self._changed(restarted=True)
+        return self.world.params.model_dump()
+
+    def _do_view(self, view: dict[str, Any]) -> None:
+        self.controls.view = View(**view)
+        self.scene.set_view(self.controls.view)
+
+    def _do_viewers(self, count: int) -> None:
+        if count > self.controls.viewers:
+            self.broadcast.send_hello()
+        self.controls.viewers = count
+
+    def _do_command_line(self) -> str:
+        return self.world.command()
+
+    def _do_export(self, form: str, path: str, done: int) -> None:
+        self._write(functools.partial(self.world.recording().write, form), path, done)
+
+    def _do_solution(self, form: str, path: str, done: int) -> None:
+        self._write(functools.partial(self.world.solution().write, form), path, done)
+
+    def _write(self, content: Callable[[], bytes], path: str, done: int) -> None:
+        """Writes to `path`, on a thread of its own, and then answers `done`."""
+
+        def write() -> None:
+            try:
+                Path(path).write_bytes(content())
+                error = ""
+            except OSError as problem:
+                error = f"the file could not be written: {problem}"
+            self.link.send(CONTROL, {"ref": done, "answer": None, "error": error})
+
+        threading.Thread(target=write, daemon=True).start()
+
+    def _changed(self, restarted: bool) -> None:
+        self.panel.show(self.world.params)
+        if restarted:
+            self.pacer.anchor()
+
+    # When the lab itself breaks -----------------------------------------------------------------
+
+    @contextlib.contextmanager
+    def _guard(self) -> Iterator[None]:
+        """A defect of a lab stops its world, not its session."""
+        try:
+            yield
+        except OSError:
+            raise  # the pipe: the end of this process
+        except Exception as error:
+            self._fail(error)
+
+    def _fail(self, error: Exception) -> str:
+        log.exception("the lab failed")
+        self.controls.failure = (
+            f"The lab failed at t = {self.world.t:.2f} s ({type(error).__name__}: {error}). "
+            "This is a defect of the lab, not of your settings. Reset starts again."
+        )
+        self.broadcast.request_update()
+        return self.controls.failure

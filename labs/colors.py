@@ -34,6 +34,8 @@ TO_LAB = np.array(
         [0.0259040371, 0.7827717662, -0.8086757660],
     ]
 )
+NO_VALUE = (0.62, 0.63, 0.65)
+"""sRGB, grey: of what has no value."""
 STEPS = 256
 MIDDLE = 0.5
 """Where a field of one value stands."""

@@ -20,7 +20,7 @@ from labs.compiled import compiled
 from labs.problems.finite_mdp import FiniteMDP
 from labs.rounding import rounded_up
 
-TIE = 1e-12
+TIE_TOLERANCE = 1e-12
 """Relative to max|C| + max|V|: controls this close are equally good, and the present one is
 kept."""
 NO_BOUND = "with gamma = 1 that bounds no distance to the limit"
@@ -42,7 +42,7 @@ class Sweep:
     """Backups so far."""
     change: float = np.inf
     """Largest change of a value in the last sweep."""
-    held: int = 0
+    evaluations: int = 0
     """Sweeps since the policy was last improved; 0: it is improved next."""
     done: str = ""
     """Why it ended, in a sentence; empty while it goes on."""
@@ -55,7 +55,7 @@ def until_done(step: Callable[[Sweep], Sweep], at: Sweep) -> Iterator[Sweep]:
         yield at
 
 
-def converged(mdp: FiniteMDP, V: np.ndarray, change: float, tolerance: float) -> str:
+def convergence_message(mdp: FiniteMDP, V: np.ndarray, change: float, tolerance: float) -> str:
     """A sentence once the last sweep, which led to V (X,), changed no value by more than
     `tolerance`, else empty."""
     if not change <= tolerance:
@@ -107,13 +107,13 @@ def optimal_backup(
     if mdp.successor is not None:
         ahead, better = np.empty(mdp.X), np.empty(mdp.X, np.int64)
         old = policy if policy.ndim == 1 else np.full(mdp.X, -1)
-        tie = TIE * _size(mdp, V)
-        change = _minimise(V, mdp.C, mdp.successor, mdp.gamma, old, tie, ahead, better)
+        tie = TIE_TOLERANCE * _size(mdp, V)
+        change = _optimal_sweep(V, mdp.C, mdp.successor, mdp.gamma, old, tie, ahead, better)
         return ahead, better, change
     Q = q_values(mdp, V)
     ahead, better = Q.min(axis=1), Q.argmin(axis=1)
     if policy.ndim == 1:
-        kept = Q[np.arange(mdp.X), policy] <= ahead + TIE * _size(mdp, V)
+        kept = Q[np.arange(mdp.X), policy] <= ahead + TIE_TOLERANCE * _size(mdp, V)
         better = np.where(kept, policy, better)
     return ahead, better, float(np.abs(ahead - V).max())
 
@@ -124,7 +124,7 @@ def policy_backup(
     """T^pi V (X,), the largest change max |T^pi V - V|, and the backups it took."""
     if policy.ndim == 1 and mdp.successor is not None:
         ahead = np.empty(mdp.X)
-        return ahead, _follow(V, mdp.C, mdp.successor, mdp.gamma, policy, ahead), mdp.X
+        return ahead, _policy_sweep(V, mdp.C, mdp.successor, mdp.gamma, policy, ahead), mdp.X
     if policy.ndim == 1:
         rows = mdp.probabilities[policy, np.arange(mdp.X)]
         ahead, backups = mdp.policy_cost(policy) + mdp.gamma * (rows @ V), mdp.X
@@ -134,7 +134,7 @@ def policy_backup(
 
 
 @compiled
-def _minimise(
+def _optimal_sweep(
     V: np.ndarray,
     C: np.ndarray,
     successor: np.ndarray,
@@ -165,7 +165,7 @@ def _minimise(
 
 
 @compiled
-def _follow(
+def _policy_sweep(
     V: np.ndarray,
     C: np.ndarray,
     successor: np.ndarray,

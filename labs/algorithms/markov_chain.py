@@ -105,7 +105,7 @@ def stationary_distribution(P: np.ndarray, closed: CommunicatingClass) -> np.nda
     return pi
 
 
-def leads_to(P: np.ndarray, goal: np.ndarray) -> np.ndarray:
+def can_reach(P: np.ndarray, goal: np.ndarray) -> np.ndarray:
     """(X,) bool: from where the chain may come into `goal` (X,) bool, those in it included."""
     found = goal
     while True:
@@ -175,7 +175,7 @@ def cost_to_go(
             if c.closed:
                 left[c.states] = False
                 costly[c.states] = C[c.states].any()
-        finite = ~leads_to(P, costly)
+        finite = ~can_reach(P, costly)
         left &= finite
     V = np.zeros(len(P))
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):

@@ -17,7 +17,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from labs.algorithms.bellman import Sweep, converged, policy_backup, until_done
+from labs.algorithms.bellman import Sweep, convergence_message, policy_backup, until_done
 from labs.algorithms.markov_chain import communicating_classes, cost_to_go
 from labs.compiled import compiled
 from labs.problems.finite_mdp import FiniteMDP
@@ -31,8 +31,8 @@ def init(V: np.ndarray, policy: np.ndarray) -> Sweep:
 def step(mdp: FiniteMDP, at: Sweep, tolerance: float) -> Sweep:
     """One sweep of T^pi over all states."""
     V, change, backups = policy_backup(mdp, at.V, at.policy)
-    done = converged(mdp, V, change, tolerance)
-    return Sweep(V, at.policy, at.count + 1, at.backups + backups, change, at.held + 1, done)
+    done = convergence_message(mdp, V, change, tolerance)
+    return Sweep(V, at.policy, at.count + 1, at.backups + backups, change, at.evaluations + 1, done)
 
 
 def iterate(mdp: FiniteMDP, V: np.ndarray, policy: np.ndarray, tolerance: float) -> Iterator[Sweep]:
@@ -45,7 +45,7 @@ def exact(mdp: FiniteMDP, policy: np.ndarray) -> np.ndarray:
     if policy.ndim == 1 and mdp.successor is not None:
         V = np.empty(mdp.X)
         rows = np.arange(mdp.X)
-        _follow_to_the_end(mdp.C[rows, policy], mdp.successor[rows, policy], mdp.gamma, V)
+        _deterministic_value(mdp.C[rows, policy], mdp.successor[rows, policy], mdp.gamma, V)
         return V
     matrix, cost = mdp.transition_matrix(policy), mdp.policy_cost(policy)
     if mdp.gamma < 1.0:
@@ -55,7 +55,7 @@ def exact(mdp: FiniteMDP, policy: np.ndarray) -> np.ndarray:
 
 
 @compiled
-def _follow_to_the_end(cost: np.ndarray, ahead: np.ndarray, gamma: float, V: np.ndarray) -> None:
+def _deterministic_value(cost: np.ndarray, ahead: np.ndarray, gamma: float, V: np.ndarray) -> None:
     """Writes V^pi for one next state `ahead` (X,) and one cost (X,) a state."""
     new, on_path, known = 0, 1, 2
     mark = np.zeros(len(V), np.int8)

@@ -16,7 +16,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from labs.algorithms.bellman import Sweep, converged, optimal_backup, policy_backup, until_done
+from labs.algorithms.bellman import (
+    Sweep,
+    convergence_message,
+    optimal_backup,
+    policy_backup,
+    until_done,
+)
 from labs.algorithms.policy_evaluation import exact
 from labs.errors import LabError
 from labs.problems.finite_mdp import FiniteMDP
@@ -30,21 +36,22 @@ def init(V: np.ndarray, policy: np.ndarray | None = None) -> Sweep:
     the first sweep makes one."""
     if policy is None:
         return Sweep(V, np.zeros(len(V), np.int64))
-    return Sweep(V, policy, held=1)
+    return Sweep(V, policy, evaluations=1)
 
 
 def step(mdp: FiniteMDP, at: Sweep, m: float, tolerance: float) -> Sweep:
     """One sweep, which improves the policy or evaluates it. m >= 1, `math.inf` for policy
     iteration."""
-    if at.held == 0:
+    if at.evaluations == 0:
         V, policy, change = optimal_backup(mdp, at.V, at.policy)
-        held = 1 if m > 1 else 0
-        backups, done = mdp.X * mdp.U, converged(mdp, V, change, tolerance)
+        evaluations = 1 if m > 1 else 0
+        backups, done = mdp.X * mdp.U, convergence_message(mdp, V, change, tolerance)
     else:
         V, change, backups = policy_backup(mdp, at.V, at.policy)
         policy, done = at.policy, ""
-        held = 0 if at.held + 1 >= m or change <= tolerance else at.held + 1
-    return Sweep(V, policy, at.count + 1, at.backups + backups, change, held, done)
+        over = at.evaluations + 1 >= m or change <= tolerance
+        evaluations = 0 if over else at.evaluations + 1
+    return Sweep(V, policy, at.count + 1, at.backups + backups, change, evaluations, done)
 
 
 def iterate(

@@ -11,7 +11,7 @@ from labs.problems.episodes import (
     Learner,
     UpdateRule,
     initial_state,
-    least,
+    min_q,
     record,
     step_size,
     transition,
@@ -32,7 +32,7 @@ def q_learning(
             next_x = transition(task, x, u, random)
             target = task.cost[x, u]
             if not task.terminal[next_x]:
-                target += task.gamma * least(q, next_x)
+                target += task.gamma * min_q(q, next_x)
             visits[x, u] += 1
             q[x, u] += step_size(rule, visits[x, u]) * (target - q[x, u])
             discount = record(task, learner, k, x, u, discount)

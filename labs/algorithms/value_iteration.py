@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from labs.algorithms.bellman import Sweep, converged, optimal_backup, until_done
+from labs.algorithms.bellman import Sweep, convergence_message, optimal_backup, until_done
 from labs.problems.finite_mdp import FiniteMDP
 
 
@@ -23,7 +23,7 @@ def init(V: np.ndarray) -> Sweep:
 def step(mdp: FiniteMDP, at: Sweep, tolerance: float) -> Sweep:
     """One sweep of T over all states."""
     V, policy, change = optimal_backup(mdp, at.V, at.policy)
-    done = converged(mdp, V, change, tolerance)
+    done = convergence_message(mdp, V, change, tolerance)
     return Sweep(V, policy, at.count + 1, at.backups + mdp.X * mdp.U, change, 0, done)
 
 

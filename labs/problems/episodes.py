@@ -116,7 +116,7 @@ def record(
 
 
 @compiled
-def least(q: np.ndarray, x: int) -> float:
+def min_q(q: np.ndarray, x: int) -> float:
     """min_u Q(x, u)."""
     cost = q[x, 0]
     for u in range(1, q.shape[1]):

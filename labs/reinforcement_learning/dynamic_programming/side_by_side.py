@@ -63,7 +63,7 @@ class Iterates:
     """(4, X) int16; RANDOM throughout where the even random policy is followed."""
     count: np.ndarray
     """(4,) sweeps."""
-    held: np.ndarray
+    evaluations: np.ndarray
     """(4,) as in `Sweep`."""
     errors: np.ndarray
     """(k + 1, 4) distance to the limit after 0, 1, ..., k sweeps; its last value where an
@@ -169,7 +169,7 @@ def _pass(
         V=np.stack([sweep.V for sweep in ends]),
         policy=np.stack([_pack_policy(sweep.policy) for sweep in ends]),
         count=np.array([sweep.count for sweep in ends]),
-        held=np.array([sweep.held for sweep in ends]),
+        evaluations=np.array([sweep.evaluations for sweep in ends]),
         errors=errors,
         backups=backups,
         done=tuple(done),
@@ -195,7 +195,7 @@ def _sweep(mdp: FiniteMDP, at: Iterates, i: int) -> Sweep:
         policy=unpack_policy(mdp, at.policy[i]),
         count=int(at.count[i]),
         backups=int(at.backups[-1, i]),
-        held=int(at.held[i]),
+        evaluations=int(at.evaluations[i]),
         done=at.done[i],
     )
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labs.algorithms.markov_chain import CommunicatingClass, is_irreducible, leads_to
+from labs.algorithms.markov_chain import CommunicatingClass, can_reach, is_irreducible
 from labs.reinforcement_learning.markov.reward_process import RewardProcess
 from labs.rounding import rounded_up
 
@@ -69,7 +69,7 @@ def _unending(process: RewardProcess, finite: np.ndarray) -> str:
     """From where costs go on for ever, from where they may, and from where they do not (`finite`):
     a matter of which states lead to which."""
     names, P = process.table.states, process.P
-    free = leads_to(P, finite)
+    free = can_reach(P, finite)
     never, may, sure = np.flatnonzero(~free), np.flatnonzero(free & ~finite), np.flatnonzero(finite)
     mean, size = (
         process.long_run @ process.C,

@@ -9,7 +9,11 @@ import numpy as np
 from labs.lab import Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
 from labs.random_numbers import seeded
-from labs.reinforcement_learning.td_control import greedy
+from labs.reinforcement_learning.td_control.greedy_walk import (
+    PERIOD,
+    follow_greedy_policies,
+    start_greedy_walk,
+)
 from labs.reinforcement_learning.td_control.params import BATCHES, LEARNING_METHODS, TdParams
 from labs.reinforcement_learning.td_control.plots import ORDER, PLOTS, learner_maps, learning_curves
 from labs.reinforcement_learning.td_control.tasks import LearningTask
@@ -55,7 +59,7 @@ class TdControl(Lab[TdParams, TdState]):
         "their values, policies and mistakes, episode by episode."
     )
     Params = TdParams
-    period = greedy.PERIOD
+    period = PERIOD
     plots = PLOTS
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Cliff": {},
@@ -83,7 +87,7 @@ class TdControl(Lab[TdParams, TdState]):
         task, many = params.task, len(params.methods)
         training = initial_training(task, many, params.learners, rng, params.q0)
         return TdState(
-            training=training, walk=greedy.start_greedy_walk(task, many), random=seeded(rng, 1)[0]
+            training=training, walk=start_greedy_walk(task, many), random=seeded(rng, 1)[0]
         )
 
     def step(self, params: TdParams, inputs: Inputs, state: TdState) -> TdState:
@@ -93,16 +97,16 @@ class TdControl(Lab[TdParams, TdState]):
         _, s = params.view
         policies = _current(params, state)["q"][:, s].argmin(axis=2)
         random = state.random.copy()
-        walk = greedy.follow_greedy_policies(params.task, policies, state.walk, random)
+        walk = follow_greedy_policies(params.task, policies, state.walk, random)
         return replace(state, t=state.t + self.period, walk=walk, random=random)
 
     def solve(self, params: TdParams, state: TdState) -> Iterator[Snapshot]:
         """A batch of episodes an iteration; goes on from what was learned."""
         task, training = params.task, state.training
-        behaviour, rule, kinds = params.behaviour, params.rule, params.kinds
+        behaviour, rule, method_numbers = params.behaviour, params.rule, params.method_numbers
         if not training["sound"]:
             rng = np.random.default_rng(training["random"][0, 0])
-            training = initial_training(task, len(kinds), params.learners, rng, params.q0)
+            training = initial_training(task, len(method_numbers), params.learners, rng, params.q0)
         elif not fits_task(training, task):
             training = transfer(training, task, params.q0)
         begun, wanted, i = episodes_done(training), round(params.episodes), 0
@@ -110,8 +114,8 @@ class TdControl(Lab[TdParams, TdState]):
         done = ""
         while not done:
             left = wanted - (episodes_done(training) - begun)
-            episodes = min(left, batch_size(task, rule, kinds, training, most))
-            training, i = train(task, behaviour, rule, kinds, training, episodes), i + 1
+            episodes = min(left, batch_size(task, rule, method_numbers, training, most))
+            training, i = train(task, behaviour, rule, method_numbers, training, episodes), i + 1
             if not training["sound"]:
                 done = "The estimates diverged."
             elif left == episodes:

@@ -127,7 +127,7 @@ class TdParams(Params):
         return [self.method] if self.second == "none" else [self.method, self.second]
 
     @property
-    def kinds(self) -> list[int]:
+    def method_numbers(self) -> list[int]:
         """The same as the algorithms number them."""
         return [list(LEARNING_METHODS).index(name) for name in self.methods]
 

@@ -6,11 +6,11 @@ Dark is cheap and pale is dear, as in a heat map of the page; what has no value 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
-from labs.colors import sequential
+from labs.colors import NO_VALUE, sequential
 from labs.scene import Color, Scene, cell_at, cell_centers
 from labs.tasks.grid_world.map import GridWorld
 from labs.tasks.grid_world.walk import GridWalk
@@ -18,8 +18,6 @@ from labs.tasks.grid_world.walk import GridWalk
 BOARD = "board"
 """The handle that a click on the board holds."""
 WALL, CLIFF, GOAL = (0.36, 0.38, 0.42), (0.55, 0.12, 0.12), (0.20, 0.66, 0.33)
-NO_VALUE = (0.62, 0.63, 0.65)
-"""Of cells without one."""
 WALKERS: tuple[Color, ...] = ("actual", "reference")
 """Of the first and the second of those side by side."""
 HEIGHT = 0.55
@@ -61,6 +59,7 @@ class Board:
         return cell_at(point, self.origin, self.size, self.rows, self.columns)
 
 
+@lru_cache(maxsize=16)
 def board(world: GridWorld) -> Board:
     """Of a world's map."""
     return Board(*world.shape)

@@ -8,15 +8,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labs.colors import sequential
+from labs.colors import NO_VALUE, sequential
 from labs.models.pendulums import hanging
 from labs.scene import Color, Scene
 from labs.shapes import Vector3
 from labs.tasks.pendulum_table.swing import Swing
 from labs.tasks.pendulum_table.table import PendulumGrid
 
-NO_VALUE = (0.62, 0.63, 0.65)
-"""Of nodes without one."""
 BALLS: tuple[Color, ...] = ("actual", "reference")
 RODS: tuple[Vector3, ...] = ((0.0, 0.41, 0.68), (0.81, 0.33, 0.0))
 """Of the first and the second of those side by side."""

@@ -256,7 +256,7 @@ def test_policy_iteration_gets_better_each_time(mdp: FiniteMDP, seed: int) -> No
     worse = np.full(mdp.X, np.inf)
     sweeps = policy_iteration.iterate(mdp, np.zeros(mdp.X), policy, math.inf, 1e-9)
     for sweep in sweeps:
-        if sweep.held == 0:
+        if sweep.evaluations == 0:
             V = policy_evaluation.exact(mdp, sweep.policy)
             assert np.max(V - worse) <= 1e-7
             worse = V
@@ -279,7 +279,11 @@ def test_an_iteration_goes_on_from_any_sweep() -> None:
     sweeps = list(policy_iteration.iterate(mdp, np.zeros(6), zeros(mdp), 4, 1e-8))
     again = policy_iteration.step(mdp, sweeps[5], 4, 1e-8)
     np.testing.assert_array_equal(again.V, sweeps[6].V)
-    assert (again.count, again.backups, again.held) == (7, sweeps[6].backups, sweeps[6].held)
+    assert (again.count, again.backups, again.evaluations) == (
+        7,
+        sweeps[6].backups,
+        sweeps[6].evaluations,
+    )
     assert all(not sweep.done for sweep in sweeps[:-1])
     assert sweeps[-1].done.startswith("No value changed by more than 1e-08")
 

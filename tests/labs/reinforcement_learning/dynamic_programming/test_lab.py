@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
+from labs.colors import NO_VALUE
 from labs.engine.catalog import find
 from labs.engine.headless import run
 from labs.engine.run import World
@@ -14,7 +15,7 @@ from labs.errors import LabError
 from labs.rounding import rounded_up
 from labs.scene import NullScene
 from labs.tasks.grid_world.map import MAPS, GridWorld
-from labs.tasks.grid_world.picture import NO_VALUE, board
+from labs.tasks.grid_world.picture import board
 from tests.labs.reinforcement_learning.dynamic_programming.worlds import (
     SLUG,
     params_of,

@@ -330,7 +330,7 @@ def test_the_best_policy_costs_the_optimum_and_not_what_an_episode_of_it_costs()
     q = -np.eye(task.mdp.U)[task.q_star.argmin(axis=1)]
     knowing = {**state.training, "q": np.tile(q, (1, 5, 1, 1))}
     rule = params.rule._replace(alpha=0.0)
-    training = train(task, params.behaviour, rule, params.kinds, knowing, 1)
+    training = train(task, params.behaviour, rule, params.method_numbers, knowing, 1)
     measured = LAB.measure(params, replace(state, training=training))
     assert measured["greedy_first"] == pytest.approx(12.737, abs=1e-3)
     assert measured["greedy_first"] == pytest.approx(measured["optimum"], rel=1e-12)

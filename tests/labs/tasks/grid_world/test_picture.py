@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
+from labs.colors import NO_VALUE
 from labs.scene import Color, NullScene
 from labs.tasks.grid_world.map import MAPS, GridWorld
 from labs.tasks.grid_world.picture import (
     CLIFF,
     GOAL,
     HEIGHT,
-    NO_VALUE,
     WALL,
     board,
     draw_board,

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from labs.tasks.pendulum_table.picture import HEIGHT, NO_VALUE, draw_table
+from labs.colors import NO_VALUE
+from labs.tasks.pendulum_table.picture import HEIGHT, draw_table
 from labs.tasks.pendulum_table.swing import push, start_swing
 from labs.tasks.pendulum_table.table import PendulumGrid
 from tests.labs.tasks.grid_world.test_picture import Drawn, finite

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from labs.colors import NO_VALUE
 from labs.engine.catalog import find
-from labs.engine.events import Event
 from labs.engine.headless import run
 from labs.engine.run import World
 from labs.errors import LabError

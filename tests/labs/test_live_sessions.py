@@ -77,7 +77,9 @@ class Session:
             case Knob():
                 return tunable.at(float(self.rng.choice([0.0, 1.0, self.rng.random()])))
             case Choice():
-                options = [v for v in tunable.options if (self.entry.slug, v) not in FAULTS]
+                options: list[Value] = [
+                    v for v in tunable.options if (self.entry.slug, v) not in FAULTS
+                ]
                 return options[self.rng.integers(len(options))]
             case Text():
                 default: Value = getattr(self.entry.lab.Params(), name)

@@ -18,10 +18,10 @@ from collections.abc import Mapping
 import numpy as np
 import pinocchio as pin
 
-NEGLIGIBLE = 1e-12
+RELATIVE_CUTOFF = 1e-12
 """Singular values below this share of the largest count as zero in the pseudo-inverse."""
 
-METHODS: Mapping[str, str] = {
+INVERSE_KINEMATICS_METHODS: Mapping[str, str] = {
     "pseudo-inverse": "Pseudo-inverse",
     "transpose": "Transpose",
     "damped": "Damped",
@@ -31,18 +31,18 @@ METHODS: Mapping[str, str] = {
 def pseudo_inverse(jacobian: np.ndarray, v: np.ndarray) -> np.ndarray:
     """q' (n,) = J^+ v: of all q' that come closest to J q' = v the shortest. J (m, n), v (m,)."""
     u, sigma, rt = np.linalg.svd(jacobian, full_matrices=False)
-    kept = sigma > NEGLIGIBLE * sigma[0]
+    kept = sigma > RELATIVE_CUTOFF * sigma[0]
     rates: np.ndarray = rt[kept].T @ ((u.T @ v)[kept] / sigma[kept])
     return rates
 
 
-def transpose(jacobian: np.ndarray, v: np.ndarray) -> np.ndarray:
+def jacobian_transpose(jacobian: np.ndarray, v: np.ndarray) -> np.ndarray:
     """q' (n,) = J^T v: downhill for |e|^2 / 2 where v is proportional to the error e."""
     rates: np.ndarray = jacobian.T @ v
     return rates
 
 
-def damped(jacobian: np.ndarray, v: np.ndarray, damping: float) -> np.ndarray:
+def damped_least_squares(jacobian: np.ndarray, v: np.ndarray, damping: float) -> np.ndarray:
     """q' (n,) = J^T (J J^T + lambda^2 I)^-1 v, lambda = `damping` > 0 in the units of J."""
     m = len(v)
     rates: np.ndarray = jacobian.T @ np.linalg.solve(
@@ -57,9 +57,9 @@ def joint_rates(method: str, jacobian: np.ndarray, v: np.ndarray, damping: float
         case "pseudo-inverse":
             return pseudo_inverse(jacobian, v)
         case "transpose":
-            return transpose(jacobian, v)
+            return jacobian_transpose(jacobian, v)
         case _:
-            return damped(jacobian, v, damping)
+            return damped_least_squares(jacobian, v, damping)
 
 
 def pose_error(placement: pin.SE3, target: pin.SE3) -> np.ndarray:
@@ -69,13 +69,13 @@ def pose_error(placement: pin.SE3, target: pin.SE3) -> np.ndarray:
     return np.concatenate([target.translation - placement.translation, turn])
 
 
-def shortened(vector: np.ndarray, longest: float) -> np.ndarray:
+def clip_norm(vector: np.ndarray, longest: float) -> np.ndarray:
     """`vector`, scaled down where its length exceeds `longest`."""
     length = float(np.linalg.norm(vector))
     return vector if length <= longest else vector * (longest / length)
 
 
-def slowed(rates: np.ndarray, fastest: float) -> np.ndarray:
+def scale_to_speed_limit(rates: np.ndarray, fastest: float) -> np.ndarray:
     """q' (n,), all of it scaled down by one factor where a joint exceeds `fastest`: the
     direction of the motion stays."""
     peak = float(np.abs(rates).max())

@@ -14,7 +14,7 @@ class Experiments:
     """The experiments of one article, and which of them a test verifies."""
 
     def __init__(self, package: str, name: str) -> None:
-        article = files(package).joinpath(f"{name}.md").read_text(encoding="utf-8")
+        article = files(package).joinpath(name, "article.md").read_text(encoding="utf-8")
         blocks = re.findall(r"```experiment\n(.*?)```", article, re.DOTALL)
         self.settings: Mapping[str, Mapping[str, Value]] = {
             block["title"]: block["set"] for block in map(tomllib.loads, blocks)

@@ -11,15 +11,21 @@ import numpy as np
 
 from labs.algorithms.absolute_stability import (
     StabilityFunction,
-    boundary,
-    largest_step,
-    measured_limit,
+    largest_stable_step,
+    measured_stability_limit,
+    stability_boundary,
 )
+from labs.algorithms.discretisation import linear_step
 from labs.algorithms.integrators import semi_implicit_euler
-from labs.algorithms.runge_kutta import TABLEAUS, Step, Tableau, parse, step
-from labs.appendix.integration.convergence import Stepper, exact, global_errors, local_errors
+from labs.algorithms.runge_kutta import (
+    TABLEAUS,
+    RungeKuttaStep,
+    Tableau,
+    parse_tableau,
+    runge_kutta_step,
+)
+from labs.appendix.integration.convergence import OneStepMethod, exact, global_errors, local_errors
 from labs.models.pendulums import Pendulum, pendulum
-from labs.reactive_control.joint_control.sampled_stability import one_step
 
 DURATION, COUNTS = 0.5, (10, 20, 40, 80, 160, 320)
 """[s] and numbers of steps of the study of errors."""
@@ -36,20 +42,20 @@ GRID = np.geomspace(0.02, LONGEST, 160)
 @lru_cache(maxsize=64)
 def tableau_of(text: str) -> Tableau:
     """The named one, or the one the text spells."""
-    return TABLEAUS[text] if text in TABLEAUS else parse(text)
+    return TABLEAUS[text] if text in TABLEAUS else parse_tableau(text)
 
 
 @lru_cache(maxsize=64)
-def stepper_of(text: str, rods: int, friction: float) -> Stepper:
+def stepper_of(text: str, rods: int, friction: float) -> OneStepMethod:
     """One step of a method."""
     plant = pendulum(rods, friction)
     if text != "semi":
-        tableau, flow = tableau_of(text), plant.flow
-        return lambda x, t, h: step(tableau, flow, x, t, h)
+        tableau, field = tableau_of(text), plant.vector_field
+        return lambda x, t, h: runge_kutta_step(tableau, field, x, t, h)
 
-    def semi_implicit(x: np.ndarray, t: float, h: float) -> Step:
+    def semi_implicit(x: np.ndarray, t: float, h: float) -> RungeKuttaStep:
         q, v = semi_implicit_euler(plant.acceleration, x[:rods], x[rods:], h)
-        return Step(np.concatenate([q, v]), 1, 0, 0.0, "")
+        return RungeKuttaStep(np.concatenate([q, v]), 1, 0, 0.0, "")
 
     return semi_implicit
 
@@ -57,12 +63,12 @@ def stepper_of(text: str, rods: int, friction: float) -> Stepper:
 @lru_cache(maxsize=4)
 def _reference(rods: int, friction: float, start: float) -> tuple[np.ndarray, ...]:
     """x(DURATION), x(LOCAL_FROM) and (k, 2 nq) x(LOCAL_FROM + h) for h of LADDER."""
-    flow = pendulum(rods, friction).flow
+    field = pendulum(rods, friction).vector_field
     x = np.zeros(2 * rods)
     x[0] = start
-    middle = exact(flow, x, 0.0, LOCAL_FROM)
-    ends = np.array([exact(flow, middle, LOCAL_FROM, LOCAL_FROM + h) for h in LADDER])
-    return exact(flow, middle, LOCAL_FROM, DURATION), middle, ends
+    middle = exact(field, x, 0.0, LOCAL_FROM)
+    ends = np.array([exact(field, middle, LOCAL_FROM, LOCAL_FROM + h) for h in LADDER])
+    return exact(field, middle, LOCAL_FROM, DURATION), middle, ends
 
 
 @lru_cache(maxsize=64)
@@ -87,9 +93,11 @@ def _limit(text: str, rods: int, friction: float) -> float:
     however slowly."""
     plant = pendulum(rods, friction)
     if text != "semi":
-        found = largest_step(StabilityFunction.of(tableau_of(text)), plant.eigenvalues)
+        found = largest_stable_step(StabilityFunction.of(tableau_of(text)), plant.eigenvalues)
     else:
-        found = measured_limit(lambda h: _semi_implicit_growth(plant, h), SHORTEST, LONGEST)
+        found = measured_stability_limit(
+            lambda h: _semi_implicit_growth(plant, h), SHORTEST, LONGEST
+        )
     return min(found, LONGEST)
 
 
@@ -110,11 +118,11 @@ def _semi_implicit_growth(plant: Pendulum, h: float) -> float:
     """The spectral radius of one step of h [s] near rest."""
     linear = plant.jacobian(np.zeros(2 * plant.model.nv), 0.0)
     no_input = np.zeros((len(linear), 0))
-    transition, _ = one_step("semi-implicit-euler", h, linear, no_input)
+    transition, _ = linear_step("semi-implicit-euler", h, linear, no_input)
     return float(np.abs(np.linalg.eigvals(transition)).max())
 
 
 @lru_cache(maxsize=64)
 def edge_of(text: str) -> np.ndarray:
     """The edge of the region of stability, complex, as far as REACH."""
-    return boundary(StabilityFunction.of(tableau_of(text)), REACH)
+    return stability_boundary(StabilityFunction.of(tableau_of(text)), REACH)

@@ -14,9 +14,9 @@ from collections.abc import Callable
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from labs.algorithms.runge_kutta import Flow, Step
+from labs.algorithms.runge_kutta import RungeKuttaStep, VectorField
 
-Stepper = Callable[[np.ndarray, float, float], Step]
+OneStepMethod = Callable[[np.ndarray, float, float], RungeKuttaStep]
 """(x (n,), t, h) to one step of a method."""
 
 ROUNDING, ASYMPTOTIC = 1e-12, 0.5
@@ -25,17 +25,17 @@ FITTED = 3
 """Points a slope is fitted to: those of the smallest steps."""
 
 
-def exact(flow: Flow, x: np.ndarray, t0: float, t1: float) -> np.ndarray:
+def exact(field: VectorField, x: np.ndarray, t0: float, t1: float) -> np.ndarray:
     """x(t1) (n,) from x(t0) = x, by SciPy's DOP853 at a relative tolerance of 1e-13."""
     solution = solve_ivp(
-        lambda t, y: flow.f(y, t), (t0, t1), x, method="DOP853", rtol=1e-13, atol=1e-14
+        lambda t, y: field.f(y, t), (t0, t1), x, method="DOP853", rtol=1e-13, atol=1e-14
     )
     end: np.ndarray = solution.y[:, -1]
     return end
 
 
 def global_errors(
-    step: Stepper, x: np.ndarray, end: np.ndarray, duration: float, counts: tuple[int, ...]
+    step: OneStepMethod, x: np.ndarray, end: np.ndarray, duration: float, counts: tuple[int, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
     """(k,) E at T = `duration` [s] for each number of steps, `end` being x(T); and (k,) the
     evaluations of f it took. 0 stands for an error that is no number."""
@@ -51,7 +51,7 @@ def global_errors(
 
 
 def local_errors(
-    step: Stepper, x: np.ndarray, t: float, ends: np.ndarray, steps: np.ndarray
+    step: OneStepMethod, x: np.ndarray, t: float, ends: np.ndarray, steps: np.ndarray
 ) -> np.ndarray:
     """(k,) e of one step from x(t) = x for each h in `steps` (k,); `ends` (k, n) are x(t + h)."""
     done = [step(x, t, h) for h in steps]

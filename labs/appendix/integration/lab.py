@@ -7,7 +7,13 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import field_validator
 
-from labs.algorithms.runge_kutta import gauss_legendre, order, order_conditions, parse, step
+from labs.algorithms.runge_kutta import (
+    gauss_legendre,
+    order,
+    order_conditions,
+    parse_tableau,
+    runge_kutta_step,
+)
 from labs.appendix.integration.accuracy import (
     COUNTS,
     GRID,
@@ -87,7 +93,7 @@ class IntegrationParams(Params):
     @classmethod
     def _is_a_tableau(cls, value: str) -> str:
         try:
-            parse(value)
+            parse_tableau(value)
         except LabError as error:
             raise ValueError(str(error)) from None
         return value
@@ -230,7 +236,7 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
             limits=np.full(many, -1.0),
         )
 
-    def step(
+    def runge_kutta_step(
         self, params: IntegrationParams, inputs: Inputs, state: IntegrationState
     ) -> IntegrationState:
         """10 ms of the motion itself, and of the methods the whole steps of h that are due."""
@@ -251,7 +257,9 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
                     x[i] = done.x
                     newton = done.iterations if NAMES[i] == "implicit" else newton
                 clock += params.h
-            exactly = step(REFERENCE, params.plant.flow, state.reference, state.t, self.period)
+            exactly = runge_kutta_step(
+                REFERENCE, params.plant.vector_field, state.reference, state.t, self.period
+            )
         reference = state.reference if exactly.status else exactly.x
         return replace(
             state,

@@ -9,14 +9,20 @@ import numpy as np
 import pinocchio as pin
 
 from labs.algorithms.inverse_kinematics import (
-    METHODS,
+    INVERSE_KINEMATICS_METHODS,
+    clip_norm,
     joint_rates,
     manipulability,
     pose_error,
-    shortened,
-    slowed,
+    scale_to_speed_limit,
 )
-from labs.algorithms.jacobian import Chain, Kinematics, analytical, geometric, geometric_rate
+from labs.algorithms.jacobian import (
+    ForwardKinematics,
+    PosedChain,
+    analytical_jacobian,
+    geometric_jacobian,
+    geometric_jacobian_rate,
+)
 from labs.lab import Inputs, Lab, Measurement, State
 from labs.models.arms import Arm, load
 from labs.params import Group, Params, Value
@@ -123,7 +129,7 @@ class DifferentialParams(Params):
     task: str = INVERSE_KINEMATICS.choice("position", TASKS, "Task", effect="restart")
     """What must follow the target, the position alone or the orientation too; singular values are
     those of its rows of J."""
-    method: str = INVERSE_KINEMATICS.choice("damped", METHODS, "Method")
+    method: str = INVERSE_KINEMATICS.choice("damped", INVERSE_KINEMATICS_METHODS, "Method")
     """How the wanted velocity of the end-effector becomes joint velocities."""
     damping: float = INVERSE_KINEMATICS.knob(
         0.1, 0.001, 1.0, "\\lambda", "m", "Damping", scale="log"
@@ -272,11 +278,11 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         v, asked = np.zeros(params.rows), np.zeros_like(q)
         if params.mode == "follow":
             v = _task_velocity(params, chain, anchor, facing, clock)[: params.rows]
-            jacobian = geometric(chain)[: params.rows]
+            jacobian = geometric_jacobian(chain)[: params.rows]
             asked = joint_rates(params.method, jacobian, v, params.damping)
         elif params.mode == "velocity":
             asked = params.rates
-        given = slowed(asked, params.fastest) if params.mode == "follow" else asked
+        given = scale_to_speed_limit(asked, params.fastest) if params.mode == "follow" else asked
         given = _within_stops(params.arm, q, given)
         model = params.arm.model
         speed = float(np.linalg.norm(asked))
@@ -297,13 +303,13 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         """Velocities are those on the sliders unless a target is followed. Singular values mix
         rows in m and in rad: they weigh 1 m as 1 rad."""
         chain = _kinematics(params.robot, params.frame).at(_posture(params, state))
-        jacobian = geometric(chain)
+        jacobian = geometric_jacobian(chain)
         sigma, product = _singular_values(params, chain, jacobian)
         rates = _rates(params, state)
         follows = params.mode == "follow"
         asked = state.asked if follows else rates
         target, _ = _target(params, state.anchor, state.clock)
-        bias = geometric_rate(chain, rates)[:3] @ rates
+        bias = geometric_jacobian_rate(chain, rates)[:3] @ rates
         return {
             "q": _posture(params, state),
             "rates": asked,
@@ -314,7 +320,7 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
             if follows
             else 0.0,
             "omega": float(np.linalg.norm(jacobian[3:] @ rates)),
-            "rpy": float(np.linalg.norm(analytical(chain, jacobian)[3:] @ rates)),
+            "rpy": float(np.linalg.norm(analytical_jacobian(chain, jacobian)[3:] @ rates)),
             "sigma_min": float(sigma[-1]),
             "near": NEAR,
             "manipulability": product,
@@ -328,8 +334,8 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
     ) -> Mapping[str, np.ndarray]:
         """The Jacobians, (6, n); the twist and the rate of the pose, (6, 2)."""
         chain = _kinematics(params.robot, params.frame).at(_posture(params, state))
-        jacobian = geometric(chain)
-        other, rates = analytical(chain, jacobian), _rates(params, state)
+        jacobian = geometric_jacobian(chain)
+        other, rates = analytical_jacobian(chain, jacobian), _rates(params, state)
         return {
             "geometric": jacobian,
             "analytical": other,
@@ -342,7 +348,7 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         """The arm, the Jacobian's columns, the twist, ellipsoids, the target and a warning."""
         q = _posture(params, state)
         chain = _kinematics(params.robot, params.frame).at(q)
-        jacobian = geometric(chain)
+        jacobian = geometric_jacobian(chain)
         tip = chain.placement.translation
         scene.camera(*CAMERA)
         scene.arm("robot", params.arm, q)
@@ -363,12 +369,12 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
 
 
 @lru_cache(maxsize=32)
-def _kinematics(robot: str, frame: str) -> Kinematics:
+def _kinematics(robot: str, frame: str) -> ForwardKinematics:
     arm = load(robot)
     if frame == "end-effector":
-        return Kinematics(arm.model, arm.tip)
+        return ForwardKinematics(arm.model, arm.tip)
     joint = min(int(frame.removeprefix("joint-")), arm.model.njoints - 1)
-    return Kinematics(arm.model, arm.model.getFrameId(arm.model.names[joint]))
+    return ForwardKinematics(arm.model, arm.model.getFrameId(arm.model.names[joint]))
 
 
 def _posture(params: DifferentialParams, state: DifferentialState) -> np.ndarray:
@@ -411,28 +417,32 @@ def _target(
 
 
 def _task_velocity(
-    params: DifferentialParams, chain: Chain, anchor: np.ndarray, facing: np.ndarray, clock: float
+    params: DifferentialParams,
+    chain: PosedChain,
+    anchor: np.ndarray,
+    facing: np.ndarray,
+    clock: float,
 ) -> np.ndarray:
     """v (6,) = (p*' + k e_p, k e_o), what the error adds cut at FASTEST and FASTEST_TURN."""
     target, velocity = _target(params, anchor, clock)
     error = params.gain * pose_error(chain.placement, pin.SE3(facing, target))
-    linear = velocity + shortened(error[:3], FASTEST)
-    return np.concatenate([linear, shortened(error[3:], FASTEST_TURN)])
+    linear = velocity + clip_norm(error[:3], FASTEST)
+    return np.concatenate([linear, clip_norm(error[3:], FASTEST_TURN)])
 
 
 def _singular_values(
-    params: DifferentialParams, chain: Chain, jacobian: np.ndarray
+    params: DifferentialParams, chain: PosedChain, jacobian: np.ndarray
 ) -> tuple[np.ndarray, float]:
     """Of the task's rows, for the joints that carry the frame; and their product."""
-    return manipulability(jacobian[: params.rows, chain.carries])
+    return manipulability(jacobian[: params.rows, chain.supports])
 
 
-def _draw_columns(scene: Scene, columns: str, chain: Chain, jacobian: np.ndarray) -> None:
+def _draw_columns(scene: Scene, columns: str, chain: PosedChain, jacobian: np.ndarray) -> None:
     """Axes z_i and columns J_pi: all at their joints, or one with the lever p_e - p_i."""
     tip = chain.placement.translation
     for i, (z, p, column) in enumerate(zip(chain.axes, chain.points, jacobian[:3].T, strict=True)):
         alone = columns == str(i + 1)
-        if not (alone or columns == "all") or not chain.carries[i]:
+        if not (alone or columns == "all") or not chain.supports[i]:
             continue
         scene.arrow(f"axis {i + 1}", p - AXIS / 2 * z, p + AXIS / 2 * z, "muted")
         if alone:
@@ -444,7 +454,7 @@ def _draw_columns(scene: Scene, columns: str, chain: Chain, jacobian: np.ndarray
 
 def _draw_twist(scene: Scene, tip: np.ndarray, twist: np.ndarray) -> None:
     """The velocity of the frame as an arrow, its angular velocity as an arc around it."""
-    linear, angular = shortened(TWIST * twist[:3], LONGEST), twist[3:]
+    linear, angular = clip_norm(TWIST * twist[:3], LONGEST), twist[3:]
     if np.linalg.norm(linear) > 0.01:
         scene.arrow("velocity", tip, tip + linear, "reference")
     omega = float(np.linalg.norm(angular))

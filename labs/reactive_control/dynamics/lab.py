@@ -10,7 +10,12 @@ from typing import Any, ClassVar
 import numpy as np
 import pinocchio as pin
 
-from labs.algorithms.equation_of_motion import Terms, direct, inverse, terms
+from labs.algorithms.equation_of_motion import (
+    EquationTerms,
+    direct_dynamics,
+    equation_terms,
+    inverse_dynamics,
+)
 from labs.algorithms.integrators import INTEGRATORS
 from labs.lab import Inputs, Lab, Measurement, State
 from labs.models.arms import load
@@ -199,7 +204,7 @@ class DynamicsState(State):
 class Instant:
     """All of the equation at one instant."""
 
-    terms: Terms
+    equation_terms: EquationTerms
     torque: np.ndarray
     """tau (nv,) [N m]"""
     external: np.ndarray
@@ -317,8 +322,8 @@ class Dynamics(Lab[DynamicsParams, DynamicsState]):
         applied = now.torque + now.external
         inertia, coriolis = now.terms.mass @ now.acceleration, now.terms.coriolis @ v
         asked = params.accelerations(model.nv, state.t)
-        found = direct(model, data, q, v, inverse(model, data, q, v, asked))
-        again = inverse(model, data, q, v, now.acceleration)
+        found = direct_dynamics(model, data, q, v, inverse_dynamics(model, data, q, v, asked))
+        again = inverse_dynamics(model, data, q, v, now.acceleration)
         return {
             "q": q,
             "v": v,
@@ -344,7 +349,7 @@ class Dynamics(Lab[DynamicsParams, DynamicsState]):
         world = _world(params.robot, params.payload, params.gravity)
         now = _instant(params, world, state)
         asked = params.accelerations(world.model.nv, state.t)
-        needed = inverse(world.model, world.data, state.q, state.v, asked) - now.external
+        needed = inverse_dynamics(world.model, world.data, state.q, state.v, asked) - now.external
         coriolis, gravity = now.terms.coriolis @ state.v, now.terms.gravity
         return {
             "mass": now.terms.mass,
@@ -397,7 +402,7 @@ def _driving(
     if params.drive == "balanced":
         tau += pin.computeGeneralizedGravity(model, data, q)
     elif params.drive == "inverse":
-        tau += inverse(model, data, q, v, params.accelerations(model.nv, t))
+        tau += inverse_dynamics(model, data, q, v, params.accelerations(model.nv, t))
         if params.force.any():
             tau -= world.tip_jacobian(q).T @ params.force
     return tau
@@ -408,10 +413,10 @@ def _instant(params: DynamicsParams, world: Plant, state: DynamicsState) -> Inst
     torque = _driving(params, world, q, v, state.t)
     external = world.tip_jacobian(q).T @ params.force
     return Instant(
-        terms(world.model, world.data, q, v),
+        equation_terms(world.model, world.data, q, v),
         torque,
         external,
-        direct(world.model, world.data, q, v, torque + external),
+        direct_dynamics(world.model, world.data, q, v, torque + external),
     )
 
 

@@ -9,23 +9,27 @@ from typing import ClassVar
 import numpy as np
 
 from labs.algorithms.integrators import INTEGRATORS
-from labs.algorithms.joint_control import LAWS, Gains, Law
+from labs.algorithms.joint_control import CONTROL_LAWS, ControlLaw, Gains
 from labs.lab import Action, Inputs, Lab, Measurement, State
 from labs.models.arms import load
 from labs.models.plant import Force, Plant, plant
 from labs.params import Group, Params, Value
 from labs.plots import Curves, Line, Readout, TimeSeries, Trace
 from labs.reactive_control.joint_control.divergence import Menu, explain
-from labs.reactive_control.joint_control.references import cycles_per_second, motion
+from labs.reactive_control.joint_control.references import cycles_per_second, reference_motion
 from labs.reactive_control.joint_control.sampled_control import (
     UNIT,
-    Loop,
-    run,
+    SampledLoop,
+    simulate_sampled,
     ticks,
     time_between_ticks,
     units,
 )
-from labs.reactive_control.joint_control.sampled_stability import LinearLoop, Robot, Setting
+from labs.reactive_control.joint_control.sampled_stability import (
+    LinearisedRobot,
+    LinearLoop,
+    Setting,
+)
 from labs.reactive_control.joint_control.step_response import StepResponse
 from labs.scene import Scene
 
@@ -285,7 +289,7 @@ class JointControl(Lab[JointParams, JointState]):
         q_ref, v_ref, a_ref = self._reference(params, phase)
         loop = self._loop(params, world, force, state.torque.copy())
         with np.errstate(all="ignore"):
-            q, v, z, torques = run(
+            q, v, z, torques = simulate_sampled(
                 loop,
                 due,
                 steps,
@@ -393,12 +397,12 @@ class JointControl(Lab[JointParams, JointState]):
         self, params: JointParams, phase: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         home = load(params.robot).home
-        return motion(params.reference, home, params.amplitude, params.rate, phase)
+        return reference_motion(params.reference, home, params.amplitude, params.rate, phase)
 
     def _loop(
         self, params: JointParams, world: Plant, force: Force | None, held: np.ndarray
-    ) -> Loop:
-        return Loop(
+    ) -> SampledLoop:
+        return SampledLoop(
             law=_law(params.controller, params.robot, params.gains),
             limit=_limit(params.robot, params.torque_limits),
             acceleration=world.acceleration(held, params.friction, force),
@@ -449,9 +453,9 @@ class JointControl(Lab[JointParams, JointState]):
 
 
 @lru_cache(maxsize=16)
-def _law(controller: str, robot: str, gains: Gains) -> Law:
+def _law(controller: str, robot: str, gains: Gains) -> ControlLaw:
     known = plant(robot)
-    return LAWS[controller](known.model, known.data, gains)
+    return CONTROL_LAWS[controller](known.model, known.data, gains)
 
 
 @lru_cache(maxsize=256)
@@ -500,7 +504,7 @@ def _force(
 def _linearised(params: JointParams, state: JointState) -> LinearLoop:
     """The loop at rest at the reference, the robot with its payload, the controller without."""
     world, known = plant(params.robot, params.payload), plant(params.robot)
-    robot = Robot.near(world.model, world.data, state.q_ref, params.friction)
+    robot = LinearisedRobot.near(world.model, world.data, state.q_ref, params.friction)
     return LinearLoop(robot, known.model, known.data, state.q_ref)
 
 

@@ -16,14 +16,13 @@ as fast as the last is at fault.
 """
 
 from dataclasses import dataclass
-from math import factorial
 
 import numpy as np
 import pinocchio as pin
-from scipy.linalg import expm
 
-from labs.algorithms.integrators import INTEGRATORS
-from labs.algorithms.joint_control import Gains, linearised, mass_matrix
+from labs.algorithms.discretisation import zero_order_hold, zero_order_hold_integrated
+from labs.algorithms.equation_of_motion import mass_matrix
+from labs.algorithms.joint_control import Gains, linearise_law
 
 GROWS = 1e-3
 """[1/s] growth below this is not told from none: at a pole on the stability boundary, rounding
@@ -35,7 +34,7 @@ k_d = 0 and T = h explicit Euler grows twice as fast as holding the torque alone
 
 
 @dataclass(frozen=True)
-class Robot:
+class LinearisedRobot:
     """The robot near a posture: M dq'' + F dq' + G dq = d tau, each (nv, nv), G = dg/dq."""
 
     mass: np.ndarray
@@ -43,7 +42,9 @@ class Robot:
     gravity: np.ndarray
 
     @classmethod
-    def near(cls, model: pin.Model, data: pin.Data, q: np.ndarray, friction: float) -> "Robot":
+    def near(
+        cls, model: pin.Model, data: pin.Data, q: np.ndarray, friction: float
+    ) -> "LinearisedRobot":
         """Linearised at rest at q (nq,), with viscous `friction` [N m s/rad] at every joint."""
         gravity = pin.computeGeneralizedGravityDerivatives(model, data, q)
         return cls(mass_matrix(model, data, q), friction * np.eye(model.nv), gravity.copy())
@@ -88,7 +89,7 @@ class Diagnosis:
 class LinearLoop:
     """A robot and its controller near a posture; `model` is the controller's."""
 
-    robot: Robot
+    robot: LinearisedRobot
     model: pin.Model
     data: pin.Data
     q: np.ndarray
@@ -103,9 +104,9 @@ class LinearLoop:
         integrated as set, or exactly."""
         a, b = self.robot.dynamics()
         phi, gamma = (
-            exactly_held(a, b, setting.period)
+            zero_order_hold(a, b, setting.period)
             if exact
-            else integrated(setting.integrator, setting.step, a, b, setting.period)
+            else zero_order_hold_integrated(setting.integrator, setting.step, a, b, setting.period)
         )
         return np.linalg.eigvals(self._closed(setting, phi, gamma, setting.period, sampled=True))
 
@@ -128,47 +129,10 @@ class LinearLoop:
         self, setting: Setting, phi: np.ndarray, gamma: np.ndarray, period: float, *, sampled: bool
     ) -> np.ndarray:
         """x and z together: u = -K x + k_z z, and z' = -dq or z+ = z - T dq."""
-        law = linearised(setting.controller, self.model, self.data, setting.gains, self.q)
+        law = linearise_law(setting.controller, self.model, self.data, setting.gains, self.q)
         n = len(self.q)
         from_x = phi - gamma @ np.hstack([law.k_q, law.k_v])
         if not law.k_z.any():
             return np.asarray(from_x)
         to_z = np.hstack([-period * np.eye(n), np.zeros((n, n))])
         return np.block([[from_x, gamma @ law.k_z], [to_z, np.eye(n) * sampled]])
-
-
-def exactly_held(a: np.ndarray, b: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
-    """Phi = exp(A T) and Gamma = int_0^T exp(A s) ds B, both from one exponential."""
-    n, m = b.shape
-    both = expm(np.block([[a, b], [np.zeros((m, n + m))]]) * period)
-    return both[:n, :n], both[:n, n:]
-
-
-def integrated(
-    integrator: str, step: float, a: np.ndarray, b: np.ndarray, period: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Phi and Gamma as this integrator makes them, in period/step steps with u held."""
-    p, q = one_step(integrator, step, a, b)
-    n, m = b.shape
-    both = np.block([[p, q], [np.zeros((m, n)), np.eye(m)]])
-    power = np.linalg.matrix_power(both, round(period / step))
-    return power[:n, :n], power[:n, n:]
-
-
-def one_step(
-    integrator: str, h: float, a: np.ndarray, b: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """P and Q of x+ = P x + Q u over one step. A Runge-Kutta method of as many stages as its
-    order p (up to 4) has P = sum_(k<=p) (hA)^k / k! and Q = h sum_(k<p) (hA)^k / (k+1)! B."""
-    eye = np.eye(len(a))
-    if integrator == "semi-implicit-euler":
-        half = len(a) // 2
-        drift = eye + h * np.eye(len(a), k=half)
-        kick = eye.copy()
-        kick[half:] += h * a[half:]
-        return drift @ kick, drift @ (h * b)
-    order = INTEGRATORS[integrator].order
-    powers = [np.linalg.matrix_power(h * a, k) for k in range(order + 1)]
-    p = sum(power / factorial(k) for k, power in enumerate(powers))
-    q = sum(power / factorial(k + 1) for k, power in enumerate(powers[:-1]))
-    return np.asarray(p), h * np.asarray(q) @ b

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pinocchio as pin
 
-from labs.algorithms.frame_chain import FrameChain, product
+from labs.algorithms.frame_chain import FrameChain, multiply_poses
 from labs.algorithms.orientation import (
     SEQUENCES,
     lock_sine,
@@ -263,7 +263,7 @@ class Kinematics(Lab[KinematicsParams, KinematicsState]):
         its angles turn now (`amplification`) and at most in any direction (`law`). Of the
         end-effector: how far its R is from orthonormal, and the same law."""
         gimbal = params.gimbal
-        rotation = product(_chain(params.robot).factors(params.q))[:3, :3]
+        rotation = multiply_poses(_chain(params.robot).factors(params.q))[:3, :3]
         tool = lock_sine(params.sequence, gimbal.angles(rotation)[1])
         phi, theta, psi = gimbal.angles(state.rotation)
         nudged = gimbal.angles(gimbal.turn(NUDGE) @ state.rotation)
@@ -294,13 +294,13 @@ class Kinematics(Lab[KinematicsParams, KinematicsState]):
         """The chain, and the end-effector's orientation in five ways."""
         chain = _chain(params.robot)
         factors = chain.factors(params.q)
-        pose = product(factors)
+        pose = multiply_poses(factors)
         rotation = pose[:3, :3]
         angle, axis = matrix_to_angle_axis(rotation)
         return {
             "factor": factors[params.shown(state.moved) - 1],
             "product": pose,
-            "dependence": chain.dependence(params.q),
+            "dependence": chain.derivative_norms(params.q),
             "rotation": rotation,
             "euler": matrix_to_euler(params.sequence, rotation)[None],
             "rpy": matrix_to_rpy(rotation)[None],

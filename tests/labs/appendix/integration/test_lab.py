@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from labs.algorithms.runge_kutta import TABLEAUS, order, parse
+from labs.algorithms.runge_kutta import TABLEAUS, order, parse_tableau
 from labs.appendix.integration.accuracy import COUNTS, LADDER, LONGEST, stepper_of
 from labs.appendix.integration.convergence import exact
 from labs.appendix.integration.lab import (
@@ -114,7 +114,7 @@ def test_half_the_step(setting: Mapping[str, Value]) -> None:
     errors = dict(zip(NAMES, world.state.global_errors, strict=True))
     assert errors["euler"][-2] / errors["euler"][-1] == pytest.approx(2.0, abs=0.1)
     assert errors["rk4"][-2] / errors["rk4"][-1] == pytest.approx(16.0, abs=0.5)
-    own = parse(world.params.tableau)
+    own = parse_tableau(world.params.tableau)
     assert order(own) == order(TABLEAUS["rk3"]) == 3
     assert not np.array_equal(own.a, TABLEAUS["rk3"].a)
 
@@ -133,7 +133,7 @@ def test_rk4_is_cheaper(setting: Mapping[str, Value]) -> None:
 @EXPERIMENTS.verify("A wrong digit")
 def test_a_wrong_digit(setting: Mapping[str, Value]) -> None:
     world = solved(setting)
-    tableau = parse(world.params.tableau)
+    tableau = parse_tableau(world.params.tableau)
     np.testing.assert_array_equal(tableau.a, TABLEAUS["rk4"].a)
     assert tableau.b.sum() == pytest.approx(31 / 30)
     assert order(tableau) == 0
@@ -296,9 +296,9 @@ def test_growth_crosses_one_at_the_limit() -> None:
 def test_local_errors_are_those_of_one_step() -> None:
     world = solved({})
     plant = world.params.plant
-    middle = exact(plant.flow, world.params.x0(), 0.0, 0.2)
+    middle = exact(plant.vector_field, world.params.x0(), 0.0, 0.2)
     for h, error in zip(LADDER, world.state.local_errors[0], strict=True):
-        wanted = middle + h * plant.f(middle, 0.0) - exact(plant.flow, middle, 0.0, h)
+        wanted = middle + h * plant.f(middle, 0.0) - exact(plant.vector_field, middle, 0.0, h)
         assert error == pytest.approx(np.linalg.norm(wanted), rel=1e-6)
     np.testing.assert_array_equal(world.state.costs[0], COUNTS)
 
@@ -322,7 +322,7 @@ def test_the_study_starts_again_when_the_tableau_changes() -> None:
 @pytest.mark.parametrize("system", ["pendulum", "double-pendulum"])
 def test_the_reference_is_the_motion(system: str) -> None:
     world, _ = moved(3.0, {"system": system})
-    wanted = exact(world.params.plant.flow, world.params.x0(), 0.0, 3.0)
+    wanted = exact(world.params.plant.vector_field, world.params.x0(), 0.0, 3.0)
     np.testing.assert_allclose(world.state.reference, wanted, atol=1e-7)
 
 

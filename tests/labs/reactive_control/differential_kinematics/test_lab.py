@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from labs.algorithms.inverse_kinematics import METHODS
-from labs.algorithms.jacobian import Kinematics
+from labs.algorithms.inverse_kinematics import INVERSE_KINEMATICS_METHODS
+from labs.algorithms.jacobian import ForwardKinematics
 from labs.lab import Inputs
 from labs.models.arms import load
 from labs.params import Value
@@ -110,7 +110,7 @@ class Arrows(NullScene):
 def test_only_the_horizontal_part_of_the_lever_counts(setting: Mapping[str, Value]) -> None:
     assert with_(setting).rates.tolist() == [0.5, 0, 0, 0, 0, 0]
     arm = load("ur5")
-    chain = Kinematics(arm.model, arm.tip).at(arm.home)
+    chain = ForwardKinematics(arm.model, arm.tip).at(arm.home)
     lever = chain.placement.translation - chain.points[0]
     assert np.linalg.norm(lever) == pytest.approx(0.61, abs=0.005)
     assert np.hypot(*lever[:2]) == pytest.approx(0.53, abs=0.005)
@@ -143,7 +143,7 @@ def test_the_angles_race(setting: Mapping[str, Value]) -> None:
     assert rpy.max() == pytest.approx(7.0, abs=0.05)
     assert rpy.argmax() * LAB.period == pytest.approx(1.57, abs=0.02)
     steepest = list(states(params, 1.57))[-1]
-    placement = Kinematics(params.arm.model, params.arm.tip).at(steepest.q).placement
+    placement = ForwardKinematics(params.arm.model, params.arm.tip).at(steepest.q).placement
     pitch = Rotation.from_matrix(placement.rotation).as_euler("ZYX")[1]
     assert np.pi / 2 - abs(pitch) == pytest.approx(0.2, abs=0.002)
     assert rpy.max() <= 1 / np.sqrt(1 - abs(np.sin(pitch)))
@@ -173,7 +173,7 @@ def test_what_is_slow_is_strong(setting: Mapping[str, Value]) -> None:
     weakest = np.linalg.norm(slow, axis=0).argmin()
     assert weakest == np.linalg.norm(strong, axis=0).argmax()
     params = with_(setting)
-    chain = Kinematics(params.arm.model, params.arm.tip).at(start(params).q)
+    chain = ForwardKinematics(params.arm.model, params.arm.tip).at(start(params).q)
     along = chain.placement.translation - chain.points[1]
     direction = strong[:, weakest] / np.linalg.norm(strong[:, weakest])
     assert abs(direction @ along) / np.linalg.norm(along) == pytest.approx(0.99, abs=0.002)
@@ -237,7 +237,7 @@ def test_the_transpose_lags_but_arrives(setting: Mapping[str, Value]) -> None:
     *_, behind = states(params, 4.0)
     resting, errors = with_(setting, reach=0.0, gain=50.0), []
     state = behind
-    kinematics = Kinematics(params.arm.model, params.arm.tip)
+    kinematics = ForwardKinematics(params.arm.model, params.arm.tip)
     for _ in range(2000):
         state = LAB.step(resting, Inputs(), state)
         tip = kinematics.at(state.q).placement.translation
@@ -256,13 +256,13 @@ def test_every_experiment_is_verified_here() -> None:
 
 
 @pytest.mark.parametrize("robot", ["ur5", "panda", "scara"])
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", INVERSE_KINEMATICS_METHODS)
 def test_a_dragged_target_is_reached(robot: str, method: str) -> None:
     params = with_({"mode": "follow"}, robot=robot, method=method, gain=50.0)
     begin = start(params)
     at = begin.anchor + np.array([-0.05, 0.08, 0.03])
     *_, end = states(params, 10.0, Inputs(handles={"target": tuple(at)}))
-    tip = Kinematics(params.arm.model, params.arm.tip).at(end.q).placement.translation
+    tip = ForwardKinematics(params.arm.model, params.arm.tip).at(end.q).placement.translation
     np.testing.assert_allclose(tip, at, atol=1e-6)
     released = LAB.step(params, Inputs(), end)
     np.testing.assert_array_equal(released.anchor, at)
@@ -272,7 +272,7 @@ def test_the_pose_task_keeps_the_orientation() -> None:
     for task, kept in (("pose", True), ("position", False)):
         params = with_({"mode": "follow", "reach": 0.2}, task=task, robot="panda")
         path = list(states(params, 4.0))
-        kinematics = Kinematics(params.arm.model, params.arm.tip)
+        kinematics = ForwardKinematics(params.arm.model, params.arm.tip)
         turns = [kinematics.at(s.q).placement.rotation @ path[0].facing.T for s in path]
         largest = max(Rotation.from_matrix(turn).magnitude() for turn in turns)
         assert (largest < 0.02) == kept
@@ -284,7 +284,7 @@ def test_the_twist_is_how_the_arm_moves(robot: str) -> None:
     velocity for what is left of the acceleration."""
     params = with_({"mode": "velocity"}, robot=robot, dq1=0.6, dq2=-0.4, dq3=0.05, dq4=0.7)
     before, now, after = list(states(params, 0.02))
-    kinematics, h = Kinematics(params.arm.model, params.arm.tip), LAB.period
+    kinematics, h = ForwardKinematics(params.arm.model, params.arm.tip), LAB.period
     p, q = (kinematics.at(s.q).placement for s in (before, after))
     twist = LAB.fields(params, now)["twist"][:, 0]
     np.testing.assert_allclose(twist[:3], (q.translation - p.translation) / (2 * h), atol=5e-5)
@@ -301,7 +301,9 @@ def test_a_slider_moves_the_arm_at_once_and_takes_the_target_along() -> None:
     moved = params.change({"q1": 0.4})
     np.testing.assert_array_equal(LAB.measure(moved, state)["q"], moved.posture)
     after = LAB.step(moved, Inputs(), state)
-    tip = Kinematics(params.arm.model, params.arm.tip).at(moved.posture).placement.translation
+    tip = (
+        ForwardKinematics(params.arm.model, params.arm.tip).at(moved.posture).placement.translation
+    )
     np.testing.assert_array_equal(after.anchor, tip)
     assert np.abs(after.q - moved.posture).max() < 1e-3
     stays = LAB.step(params.change({"mode": "posture"}), Inputs(), state)

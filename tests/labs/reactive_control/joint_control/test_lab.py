@@ -26,7 +26,7 @@ from labs.reactive_control.joint_control.lab import (
     JointParams,
     JointState,
 )
-from labs.reactive_control.joint_control.sampled_stability import Robot
+from labs.reactive_control.joint_control.sampled_stability import LinearisedRobot
 from labs.scene import NullScene
 
 LAB = JointControl()
@@ -89,7 +89,7 @@ def test_open_loop_drifts(setting: Mapping[str, Value]) -> None:
     params = with_(setting)
     path = list(states(params, 2.0))
     world = plant("ur5")
-    a, _ = Robot.near(world.model, world.data, path[0].q_ref, 0.0).dynamics()
+    a, _ = LinearisedRobot.near(world.model, world.data, path[0].q_ref, 0.0).dynamics()
     assert np.linalg.eigvals(a).real.max() == pytest.approx(4.46, abs=0.005)
     for k in (10, 20):
         start = np.concatenate([error(path[0]), np.zeros(6)])
@@ -285,7 +285,7 @@ def test_a_push_is_an_impulse() -> None:
     forces = [LAB.measure(params, s)["force"] for s in path]
     assert forces == [0.1 if 5 < k <= 5 + PUSH_STEPS else 0.0 for k in range(len(path))]
     world = plant("ur5")
-    mass = Robot.near(world.model, world.data, path[0].q, 0.0).mass
+    mass = LinearisedRobot.near(world.model, world.data, path[0].q, 0.0).mass
     impulse = world.tip_jacobian(path[0].q).T @ np.array([0.0, 0.0, -0.1 * 0.2])
     np.testing.assert_allclose(path[26].v, np.linalg.solve(mass, impulse), rtol=2e-3, atol=1e-5)
 

@@ -5,20 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from scipy.integrate import solve_ivp
 
 from labs.algorithms.integrators import INTEGRATORS
-from labs.algorithms.joint_control import LAWS, Gains
+from labs.algorithms.joint_control import CONTROL_LAWS, Gains
 from labs.models.plant import plant
 from labs.reactive_control.joint_control.divergence import Menu, explain, remedies
-from labs.reactive_control.joint_control.sampled_control import Loop, run
+from labs.reactive_control.joint_control.sampled_control import SampledLoop, simulate_sampled
 from labs.reactive_control.joint_control.sampled_stability import (
     GROWS,
+    LinearisedRobot,
     LinearLoop,
-    Robot,
     Setting,
-    exactly_held,
-    integrated,
 )
 
 DEFAULT = Setting("pd-gravity", Gains(200.0, 0.0, 30.0), 1e-3, "semi-implicit-euler", 1e-3)
@@ -33,7 +30,9 @@ MENU = Menu((0.001, 0.002, 0.005, 0.01, 0.02, 0.05), (1e-4, 2e-4, 5e-4, 1e-3, 2e
 def linear(robot: str = "ur5", payload: float = 0.0, friction: float = 0.0) -> LinearLoop:
     world, known = plant(robot, payload), plant(robot)
     q = known.arm.home
-    return LinearLoop(Robot.near(world.model, world.data, q, friction), known.model, known.data, q)
+    return LinearLoop(
+        LinearisedRobot.near(world.model, world.data, q, friction), known.model, known.data, q
+    )
 
 
 def growth_of_the_robot(setting: Setting, start: float, seconds: float) -> float:
@@ -42,8 +41,8 @@ def growth_of_the_robot(setting: Setting, start: float, seconds: float) -> float
     world = plant("ur5")
     home, n = world.arm.home, 6
     held = np.zeros(n)
-    loop = Loop(
-        law=LAWS[setting.controller](world.model, world.model.createData(), setting.gains),
+    loop = SampledLoop(
+        law=CONTROL_LAWS[setting.controller](world.model, world.model.createData(), setting.gains),
         limit=np.full(n, np.inf),
         acceleration=world.acceleration(held),
         held=held,
@@ -62,7 +61,7 @@ def growth_of_the_robot(setting: Setting, start: float, seconds: float) -> float
     periods = round(seconds / setting.period)
     for _ in range(periods):
         x *= start / np.linalg.norm(weight * x)
-        q, v, z, _ = run(
+        q, v, z, _ = simulate_sampled(
             loop,
             (0,),
             steps,
@@ -76,30 +75,6 @@ def growth_of_the_robot(setting: Setting, start: float, seconds: float) -> float
         logs.append(float(np.log(np.linalg.norm(weight * x) / start)))
     late = np.cumsum(logs)[periods // 2 :]
     return float(np.polyfit(setting.period * np.arange(len(late)), late, 1)[0])
-
-
-def test_exact_hold_is_the_ode_under_a_constant_input() -> None:
-    a, b = linear(payload=2.0, friction=1.0).robot.dynamics()
-    phi, gamma = exactly_held(a, b, 0.01)
-    rng = np.random.default_rng(1)
-    x, u = rng.normal(size=len(a)), rng.normal(size=b.shape[1])
-    ode = solve_ivp(lambda t, x: a @ x + b @ u, (0, 0.01), x, rtol=1e-12, atol=1e-13)
-    np.testing.assert_allclose(phi @ x + gamma @ u, ode.y[:, -1], rtol=1e-9, atol=1e-10)
-
-
-@pytest.mark.parametrize("name", INTEGRATORS)
-def test_the_integrators_map_is_what_the_integrator_does(name: str) -> None:
-    a, b = linear(payload=2.0, friction=3.0).robot.dynamics()
-    n = b.shape[1]
-    rng = np.random.default_rng(1)
-    q, v, u = rng.normal(size=(3, n))
-    phi, gamma = integrated(name, 2e-3, a, b, 0.01)
-    expected = phi @ np.concatenate([q, v]) + gamma @ u
-    for _ in range(5):
-        q, v = INTEGRATORS[name].step(
-            lambda q, v: a[n:] @ np.concatenate([q, v]) + b[n:] @ u, q, v, 2e-3
-        )
-    np.testing.assert_allclose(np.concatenate([q, v]), expected, rtol=1e-10, atol=1e-10)
 
 
 def test_dynamics_are_the_derivatives_of_the_robot() -> None:
@@ -125,7 +100,7 @@ def test_a_pid_loop_has_its_textbook_stability_limit() -> None:
     """One joint of inertia m without gravity: stable while k_i < k_p k_d / m."""
     m = 1.7
     one = LinearLoop(
-        Robot(np.array([[m]]), np.zeros((1, 1)), np.zeros((1, 1))),
+        LinearisedRobot(np.array([[m]]), np.zeros((1, 1)), np.zeros((1, 1))),
         model := pin.buildSampleModelManipulator(),
         model.createData(),
         np.zeros(1),

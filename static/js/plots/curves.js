@@ -22,7 +22,7 @@ export class Curves {
     this.draw();
   }
 
-  // The curves of a trace, one a column where its y is (n, k).
+  // The curves of a trace, one a column where its y is (n, k); its x may be, too.
   expand(trace, fields) {
     const { log_x: logX, log_y: logY } = this.plot;
     const place = (v, log) => (log ? Math.log10(v) : v); // of what is not positive: not finite
@@ -33,11 +33,11 @@ export class Curves {
     const count = several ? ys[0].length : (labels?.length ?? 1);
     return Array.from({ length: count }, (_, k) => ({
       style: trace.style,
-      series: several && trace.series ? ((trace.series - 1 + k) % SERIES) + 1 : trace.series,
+      series: trace.series ? ((trace.series - 1 + k) % SERIES) + 1 : 0,
       label: labels ? labels[k] : trace.label.replace("{}", k + 1),
       note: trace.note ? (fields[trace.note] ?? [])[k] : undefined,
       points: xs
-        .map((v, i) => [place(v, logX), place(several ? ys[i][k] : ys[i], logY)])
+        .map((v, i) => [place(Array.isArray(v) ? v[k] : v, logX), place(several ? ys[i][k] : ys[i], logY)])
         .filter(([a, b]) => Number.isFinite(a) && Number.isFinite(b)),
     }));
   }

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from labs.algorithms.runge_kutta import EULER, RK4, RungeKuttaStep, VectorField, runge_kutta_step
-from labs.appendix.integration.convergence import exact, global_errors, local_errors, slope
+from labs.appendix.integration.convergence import (
+    exact_solution,
+    fitted_order,
+    global_errors,
+    local_errors,
+)
 
 OMEGA = 2.0
 M = np.array([[0.0, 1.0], [-(OMEGA**2), 0.0]])
@@ -17,7 +22,7 @@ def at(t: float) -> np.ndarray:
 
 
 def test_the_reference_is_the_closed_form() -> None:
-    np.testing.assert_allclose(exact(FLOW, at(0.4), 0.4, 3.0), at(3.0), atol=1e-11)
+    np.testing.assert_allclose(exact_solution(FLOW, at(0.4), 0.4, 3.0), at(3.0), atol=1e-11)
 
 
 def test_errors_are_the_distance_from_it() -> None:
@@ -50,6 +55,6 @@ def test_an_error_that_is_no_number_is_left_out() -> None:
 
 def test_a_slope_is_fitted_to_what_says_something() -> None:
     h = np.array([1.0, 0.1, 0.01, 0.001, 0.0001])
-    assert slope(h, 3.0 * h**2) == pytest.approx(2.0)
-    assert slope(h, np.array([0.9, 0.4, 4e-4, 4e-7, 1e-13])) == pytest.approx(3.0)
-    assert np.isnan(slope(h, np.zeros(5)))
+    assert fitted_order(h, 3.0 * h**2) == pytest.approx(2.0)
+    assert fitted_order(h, np.array([0.9, 0.4, 4e-4, 4e-7, 1e-13])) == pytest.approx(3.0)
+    assert np.isnan(fitted_order(h, np.zeros(5)))

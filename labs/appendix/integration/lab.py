@@ -127,14 +127,18 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
         """One method an iteration: its errors for each of STEP_SIZES, and its limit. What is
         known for other parameters stands until it is replaced."""
         studied = {
-            name: getattr(state, name)
-            for name in ("global_errors", "local_errors", "costs", "limits")
+            "global_errors": state.global_errors,
+            "local_errors": state.local_errors,
+            "costs": state.costs,
+            "limits": state.limits,
         }
         for i, name in enumerate(METHOD_NAMES):
-            rows = errors_and_limit(*params.method(name), params.start)
+            errors, local, costs, limit = errors_and_limit(*params.method(name), params.start)
             studied = {
-                key: _with_row(array, i, row)
-                for (key, array), row in zip(studied.items(), rows, strict=True)
+                "global_errors": _with_row(studied["global_errors"], i, errors),
+                "local_errors": _with_row(studied["local_errors"], i, local),
+                "costs": _with_row(studied["costs"], i, costs),
+                "limits": _with_row(studied["limits"], i, limit),
             }
             done = "All methods studied." if i == len(METHOD_NAMES) - 1 else ""
             yield Snapshot(i + 1, studied, done, (i + 1) / len(METHOD_NAMES))

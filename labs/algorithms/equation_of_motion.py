@@ -34,11 +34,17 @@ class Terms:
 
 def terms(model: pin.Model, data: pin.Data, q: np.ndarray, v: np.ndarray) -> Terms:
     """M(q), C(q, v) and g(q) at q (nq,) [rad] and v (nv,) [rad/s]."""
-    upper = np.triu(pin.crba(model, data, q))
-    mass = upper + np.triu(upper, 1).T
+    mass = mass_matrix(model, data, q)
     coriolis = pin.computeCoriolisMatrix(model, data, q, v).copy()
     gravity = pin.computeGeneralizedGravity(model, data, q).copy()
     return Terms(mass, coriolis, gravity)
+
+
+def mass_matrix(model: pin.Model, data: pin.Data, q: np.ndarray) -> np.ndarray:
+    """M(q), (nv, nv), both triangles [kg m^2], at q (nq,) [rad]."""
+    upper = np.triu(pin.crba(model, data, q))
+    mass: np.ndarray = upper + np.triu(upper, 1).T
+    return mass
 
 
 def direct(

@@ -21,6 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
+from labs.algorithms.equation_of_motion import mass_matrix
+
 Law = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -96,13 +98,6 @@ def linearised(
         return Feedback(gains.kp * eye - gravity, gains.kd * eye, zero)
     mass = mass_matrix(model, data, q)
     return Feedback(gains.kp * mass - gravity, gains.kd * mass, zero)
-
-
-def mass_matrix(model: pin.Model, data: pin.Data, q: np.ndarray) -> np.ndarray:
-    """M(q), (nv, nv), both triangles [kg m^2]."""
-    upper = np.triu(pin.crba(model, data, q))
-    mass: np.ndarray = upper + np.triu(upper, 1).T
-    return mass
 
 
 def _each(model: pin.Model, gains: Gains) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -22,8 +22,10 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import expm
 
+from labs.algorithms.equation_of_motion import mass_matrix
 from labs.algorithms.integrators import INTEGRATORS
-from labs.algorithms.joint_control import Gains, linearised, mass_matrix
+from labs.algorithms.joint_control import LAWS, Gains, linearised
+from labs.algorithms.sampled_control import UNIT, time_between_ticks, units
 
 GROWS = 1e-3
 """[1/s] growth below this is not told from none: at a pole on the stability boundary, rounding
@@ -41,12 +43,15 @@ class Robot:
     mass: np.ndarray
     friction: np.ndarray
     gravity: np.ndarray
+    load: np.ndarray
+    """g (nv,) [N m]: the torque that holds it there."""
 
     @classmethod
     def near(cls, model: pin.Model, data: pin.Data, q: np.ndarray, friction: float) -> "Robot":
         """Linearised at rest at q (nq,), with viscous `friction` [N m s/rad] at every joint."""
         gravity = pin.computeGeneralizedGravityDerivatives(model, data, q)
-        return cls(mass_matrix(model, data, q), friction * np.eye(model.nv), gravity.copy())
+        load = pin.computeGeneralizedGravity(model, data, q).copy()
+        return cls(mass_matrix(model, data, q), friction * np.eye(model.nv), gravity.copy(), load)
 
     def dynamics(self) -> tuple[np.ndarray, np.ndarray]:
         """A (2n, 2n) and B (2n, n)."""
@@ -63,14 +68,19 @@ class Robot:
 
 @dataclass(frozen=True)
 class Setting:
-    """What a loop consists of, besides the robot. Times in seconds; `period` is the time
-    between ticks and a whole number of steps."""
+    """What a loop consists of, besides the robot. Times in seconds."""
 
     controller: str
     gains: Gains
-    period: float
+    control_period: float
+    """As it is set, at least the time between two ticks."""
     integrator: str
     step: float
+
+    @property
+    def period(self) -> float:
+        """Between two ticks: the control period rounded up to whole integration steps."""
+        return time_between_ticks(units(self.control_period), units(self.step)) * UNIT
 
 
 @dataclass(frozen=True)
@@ -114,6 +124,21 @@ class LinearLoop:
         radius = float(np.abs(self.multipliers(setting, exact=exact)).max())
         return float(np.log(max(radius, 1e-300))) / setting.period
 
+    def sag(self, setting: Setting) -> float:
+        """[rad] how far from q a joint comes to rest: what the law's torque at q lacks of the
+        load, over the stiffness, (K_q + G) dq = tau - g. None with an integral; infinite without
+        any stiffness."""
+        law = linearised(setting.controller, self.model, self.data, setting.gains, self.q)
+        zero = np.zeros_like(self.q)
+        torque = LAWS[setting.controller](self.model, self.data, setting.gains)
+        lacking = torque(self.q, zero, zero, self.q, zero, zero) - self.robot.load
+        if law.k_z.any() or np.abs(lacking).max() < 1e-9:
+            return 0.0
+        stiffness = law.k_q + self.robot.gravity
+        if np.linalg.matrix_rank(stiffness) < len(zero):
+            return np.inf
+        return float(np.abs(np.linalg.solve(stiffness, lacking)).max())
+
     def diagnose(self, setting: Setting) -> Diagnosis:
         """Which of the three loops is the first to be at fault."""
         continuous = float(self.poles(setting).real.max())
@@ -148,11 +173,16 @@ def integrated(
     integrator: str, step: float, a: np.ndarray, b: np.ndarray, period: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Phi and Gamma as this integrator makes them, in period/step steps with u held."""
-    p, q = one_step(integrator, step, a, b)
-    n, m = b.shape
+    return held(*one_step(integrator, step, a, b), round(period / step))
+
+
+def held(p: np.ndarray, q: np.ndarray, steps: int) -> tuple[np.ndarray, np.ndarray]:
+    """P^k and (P^(k-1) + ... + I) Q: k = `steps` steps x+ = P x + Q u, (n, n) and (n, m), under
+    one u."""
+    n, m = q.shape
     both = np.block([[p, q], [np.zeros((m, n)), np.eye(m)]])
-    power = np.linalg.matrix_power(both, round(period / step))
-    return power[:n, :n], power[:n, n:]
+    power = np.linalg.matrix_power(both, steps)
+    return power[:n, :n].copy(), power[:n, n:].copy()
 
 
 def one_step(

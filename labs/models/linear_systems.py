@@ -17,6 +17,7 @@ import numpy as np
 import pinocchio as pin
 
 from labs.algorithms.integrators import rk4
+from labs.algorithms.sampled_stability import held
 from labs.errors import LabError
 from labs.models.arms import Arm, Box, Cylinder, Shape, Vector3, Visual, load
 from labs.models.cart_pole import REACH
@@ -195,17 +196,14 @@ def _at_rest(
 
 @lru_cache(maxsize=32)
 def _linear(name: str, period: float) -> tuple[np.ndarray, np.ndarray]:
-    """[A B; 0 I] over one STEP, to the power of their number."""
+    """Of the steps in a period, u held."""
     steps = round(period / STEP)
     if steps < 1 or abs(steps * STEP - period) > 1e-9:
         raise LabError(f"T = {period} s: it takes whole steps of {STEP} s, one at least")
     system = linear_system(name)
-    n, m = system.nx, system.nu
     one = Discrete(system.mechanism, STEP, "rk4")
     _, a, b = one.linearize(system.x_eq[None], system.u_eq[None])
-    both = np.block([[a[0], b[0]], [np.zeros((m, n)), np.eye(m)]])
-    power = np.linalg.matrix_power(both, steps)
-    return power[:n, :n].copy(), power[:n, n:].copy()
+    return held(a[0], b[0], steps)
 
 
 def _piece(joint: int, placement: pin.SE3, shape: Shape, color: Vector3) -> Visual:

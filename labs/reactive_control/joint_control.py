@@ -12,7 +12,7 @@ from labs.algorithms.divergence import Menu, explain
 from labs.algorithms.integrators import INTEGRATORS
 from labs.algorithms.joint_control import LAWS, Gains, Law
 from labs.algorithms.joint_references import cycles_per_second, motion
-from labs.algorithms.sampled_control import UNIT, Loop, run, ticks, time_between_ticks, units
+from labs.algorithms.sampled_control import UNIT, Loop, run, ticks, units
 from labs.algorithms.sampled_stability import LinearLoop, Robot, Setting
 from labs.algorithms.step_response import StepResponse
 from labs.lab import Action, Inputs, Lab, Measurement, State
@@ -47,7 +47,7 @@ CONTROLLERS = {
     "computed-torque": "Computed torque (beyond the notes)",
 }
 REFERENCES = {"set-point": "Set point", "sinusoid": "Sinusoid", "minimum-jerk": "Minimum jerk"}
-HIGHEST_KD = 200.0
+HIGHEST_KP, HIGHEST_KD = 2000.0, 200.0
 PERIODS = {0.001: "1 ms", 0.002: "2 ms", 0.005: "5 ms", 0.01: "10 ms", 0.02: "20 ms", 0.05: "50 ms"}
 STEPS = {
     0.0001: "0.1 ms",
@@ -58,6 +58,7 @@ STEPS = {
     0.005: "5 ms",
     0.01: "10 ms",
 }
+MENU = Menu(tuple(PERIODS), tuple(STEPS), HIGHEST_KP, HIGHEST_KD)
 DIRECTIONS = {"x": "+x", "y": "+y", "z": "+z", "-x": "-x", "-y": "-y", "-z": "-z"}
 
 
@@ -128,7 +129,7 @@ class JointParams(Params):
     kp: float = knob(
         200.0,
         0.0,
-        2000.0,
+        HIGHEST_KP,
         symbol="k_p",
         unit="N·m/rad",
         group="Controller",
@@ -255,8 +256,7 @@ class JointParams(Params):
     @property
     def setting(self) -> Setting:
         """The loop, for the analysis of its stability."""
-        period = time_between_ticks(units(self.control_period), units(self.step)) * UNIT
-        return Setting(self.controller, self.gains, period, self.integrator, self.step)
+        return Setting(self.controller, self.gains, self.control_period, self.integrator, self.step)
 
 
 @dataclass(kw_only=True)
@@ -483,7 +483,7 @@ class JointControl(Lab[JointParams, JointState]):
     def fields(self, params: JointParams, state: JointState) -> Mapping[str, np.ndarray]:
         """Eigenvalues of the loop linearised at rest at the reference: under continuous
         control, and of one control period as simulated."""
-        loop = _linearised(params, state)
+        loop = _linearised(params, state.q_ref)
         poles, multipliers = loop.poles(params.setting), loop.multipliers(params.setting)
         return {
             "poles_re": poles.real,
@@ -556,11 +556,7 @@ class JointControl(Lab[JointParams, JointState]):
         return StepResponse.to(state.t, q_ref - state.q)
 
     def _diverged(self, params: JointParams, world: Plant, state: JointState) -> JointState:
-        why = explain(
-            _linearised(params, state),
-            params.setting,
-            Menu(tuple(PERIODS), tuple(STEPS), HIGHEST_KD),
-        )
+        why = explain(along_the_reference(params, state.q_ref), params.setting, MENU)
         stopped = copy.deepcopy(state)
         stopped.trouble = (
             f"Diverged at t = {state.t:.2f} s: a joint passed {FASTEST:g} rad/s. {why}"
@@ -617,11 +613,18 @@ def _force(
     return force
 
 
-def _linearised(params: JointParams, state: JointState) -> LinearLoop:
-    """The loop at rest at the reference, the robot with its payload, the controller without."""
+def _linearised(params: JointParams, q: np.ndarray) -> LinearLoop:
+    """The loop at rest at q (nq,), the robot with its payload, the controller without."""
     world, known = plant(params.robot, params.payload), plant(params.robot)
-    robot = Robot.near(world.model, world.data, state.q_ref, params.friction)
-    return LinearLoop(robot, known.model, known.data, state.q_ref)
+    robot = Robot.near(world.model, world.data, q, params.friction)
+    return LinearLoop(robot, known.model, known.data, q)
+
+
+def along_the_reference(params: JointParams, q_ref: np.ndarray) -> list[LinearLoop]:
+    """The loop where the reference is, q_ref (nq,), and where it comes on its way."""
+    home, phases = load(params.robot).home, np.array([0.0, 0.25, 0.45, 0.75])
+    on_its_way, _, _ = motion(params.reference, home, params.amplitude, params.rate, phases)
+    return [_linearised(params, q) for q in (q_ref, *np.unique(on_its_way, axis=0))]
 
 
 def _pushed(rows: np.ndarray, newest: np.ndarray) -> np.ndarray:

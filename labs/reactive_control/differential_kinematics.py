@@ -10,8 +10,10 @@ import pinocchio as pin
 
 from labs.algorithms.inverse_kinematics import (
     METHODS,
+    REACHED,
     joint_rates,
     manipulability,
+    nearest_distance,
     pose_error,
     shortened,
     slowed,
@@ -20,13 +22,16 @@ from labs.algorithms.jacobian import Chain, Kinematics, analytical, geometric, g
 from labs.lab import Inputs, Lab, Measurement, State
 from labs.models.arms import Arm, load
 from labs.params import Params, Value, choice, knob
-from labs.plots import Bars, Line, Matrix, Readout, TimeSeries
+from labs.plots import Bars, Line, Matrix, Note, Readout, TimeSeries
 from labs.scene import Scene
 
 NEAR = 0.05
 """A smallest singular value below this is called near a singularity."""
 FASTEST, FASTEST_TURN = 0.5, 1.0
 """[m/s], [rad/s] what the feedback of the error may ask of the end-effector."""
+SETTLED, STARTS = 10, 5
+"""World steps a target's way stays as it is before it is asked whether it is within reach, and
+postures that search begins at, besides the present one."""
 LAP = 8.0
 """[s] the target's way out and back."""
 WORST_CONDITION = 1e6
@@ -257,6 +262,12 @@ class DifferentialState(State):
     """Time since the target was put there [s]."""
     peak: float = 0.0
     """Largest |q'| asked so far [rad/s]."""
+    farthest: np.ndarray
+    """(3,) [m] where the target's way leads to; where it is, if it rests."""
+    settled: int = 0
+    """World steps since that changed."""
+    nearest: float = 0.0
+    """[m] how near to it the frame can come, as far as is known."""
 
 
 class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
@@ -301,7 +312,9 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         Readout("manipulability", "Manipulability", ""),
         Readout("condition", "Condition number", ""),
         Readout("peak", "Fastest joint speed asked", "rad/s"),
+        Readout("short", "Target out of reach by", "m"),
         Readout("bias", "Acceleration at constant joint velocities", "m/s²"),
+        Note("Reach", "within_reach"),
     )
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Follow the ball": {"mode": "follow", "columns": "none"},
@@ -323,6 +336,7 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
             given=still,
             anchor=here.translation.copy(),
             facing=here.rotation.copy(),
+            farthest=here.translation.copy(),
         )
 
     def step(
@@ -350,6 +364,11 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         given = _within_stops(params.arm, q, given)
         model = params.arm.model
         speed = float(np.linalg.norm(asked))
+        farthest, _ = _target(params, anchor, LAP / 2)
+        settled = state.settled + 1 if np.array_equal(farthest, state.farthest) else 0
+        nearest = state.nearest if settled else 0.0
+        if settled == SETTLED and params.mode == "follow":
+            nearest = _nearest(params, farthest, q)
         return DifferentialState(
             t=state.t + self.period,
             q=np.clip(q + self.period * given, model.lowerPositionLimit, model.upperPositionLimit),
@@ -361,6 +380,9 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
             facing=facing.copy(),
             clock=clock + self.period if params.mode == "follow" and held is None else 0.0,
             peak=max(state.peak, speed) if params.mode == "follow" else 0.0,
+            farthest=farthest,
+            settled=settled,
+            nearest=nearest,
         )
 
     def measure(self, params: DifferentialParams, state: DifferentialState) -> Measurement:
@@ -374,7 +396,8 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         asked = state.asked if follows else rates
         target, _ = _target(params, state.anchor, state.clock)
         bias = geometric_rate(chain, rates)[:3] @ rates
-        return {
+        short = {"short": state.nearest} if follows and state.nearest > REACHED else {}
+        return short | {
             "q": _posture(params, state),
             "rates": asked,
             "speed": float(np.linalg.norm(asked)),
@@ -408,6 +431,18 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
             "sigma": _singular_values(params, chain, jacobian)[0],
         }
 
+    def notes(self, params: DifferentialParams, state: DifferentialState) -> Mapping[str, str]:
+        """Whether the target can be reached."""
+        if params.mode != "follow":
+            return {"within_reach": "No target is followed."}
+        if state.nearest <= REACHED:
+            return {"within_reach": "Nothing keeps the frame from where the target is."}
+        where = "At the far end of its way the" if params.reach > 0.0 else "The"
+        return {
+            "within_reach": f"{where} target is out of reach: no posture was found that brings "
+            f"the frame nearer to it than {state.nearest:.3f} m."
+        }
+
     def draw(self, scene: Scene, params: DifferentialParams, state: DifferentialState) -> None:
         """The arm, the Jacobian's columns, the twist, ellipsoids, the target and a warning."""
         q = _posture(params, state)
@@ -423,6 +458,9 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         if params.mode == "follow":
             target, _ = _target(params, state.anchor, state.clock)
             scene.handle("target", target)
+            if state.nearest > REACHED:
+                text = f"Out of reach by {state.nearest:.2f} m"
+                scene.label("out of reach", text, state.farthest + 0.1 * UP)
             if params.reach > 0.0:
                 end, _ = _target(params, state.anchor, LAP / 2)
                 scene.trail("path", np.array([state.anchor, end]), "reference")
@@ -478,6 +516,15 @@ def _target(
     way = params.reach * (1.0 - np.cos(phase)) / 2.0
     speed = params.reach * np.pi / LAP * np.sin(phase)
     return anchor + way * direction, speed * direction
+
+
+def _nearest(params: DifferentialParams, target: np.ndarray, q: np.ndarray) -> float:
+    """[m] how near the frame can come to a place (3,)."""
+    model, kinematics = params.arm.model, _kinematics(params.robot, params.frame)
+    lower, upper = model.lowerPositionLimit, model.upperPositionLimit
+    within = np.maximum(lower, -np.pi), np.minimum(upper, np.pi)
+    others = np.random.default_rng(0).uniform(*within, (STARTS, len(q)))
+    return nearest_distance(kinematics, target, [q, *others], lower, upper)
 
 
 def _task_velocity(

@@ -493,7 +493,7 @@ def test_trouble_keeps_the_last_sane_state() -> None:
 
 
 def diverging(rng: np.random.Generator) -> tuple[JointParams, JointState]:
-    """A random setting that diverges within 1 s, and how it ended."""
+    """A random setting that diverges within half a second, and how it ended."""
 
     def anything(low: float, high: float) -> float:
         return float(f"{np.exp(rng.uniform(np.log(low), np.log(high))):.3g}")
@@ -513,7 +513,7 @@ def diverging(rng: np.random.Generator) -> tuple[JointParams, JointState]:
             control_period=float(rng.choice(list(MENU.periods))),
             step=float(rng.choice([h for h in MENU.steps if h >= 0.002])),
         )
-        stopped = last(params, 1.0)
+        stopped = last(params, 0.5)
         if stopped.trouble:
             return params, stopped
     raise AssertionError("nothing diverges")
@@ -547,7 +547,7 @@ SETTING = ("controller", "control_period", "integrator", "step")
 
 
 def test_advice_helps_where_it_is_given() -> None:
-    check_advice(seed=0, count=3, seconds=2.0)
+    check_advice(seed=0, count=3, seconds=1.0)
 
 
 @pytest.mark.study

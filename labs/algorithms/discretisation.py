@@ -25,11 +25,16 @@ def zero_order_hold_integrated(
     integrator: str, step: float, a: np.ndarray, b: np.ndarray, period: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Phi and Gamma as this integrator makes them, in period/step steps with u held."""
-    p, q = linear_step(integrator, step, a, b)
-    n, m = b.shape
+    return repeat_held(*linear_step(integrator, step, a, b), round(period / step))
+
+
+def repeat_held(p: np.ndarray, q: np.ndarray, steps: int) -> tuple[np.ndarray, np.ndarray]:
+    """P^k and (P^(k-1) + ... + I) Q: k = `steps` steps x+ = P x + Q u, (n, n) and (n, m), under
+    one u."""
+    n, m = q.shape
     both = np.block([[p, q], [np.zeros((m, n)), np.eye(m)]])
-    power = np.linalg.matrix_power(both, round(period / step))
-    return power[:n, :n], power[:n, n:]
+    power = np.linalg.matrix_power(both, steps)
+    return power[:n, :n].copy(), power[:n, n:].copy()
 
 
 def linear_step(

@@ -41,7 +41,7 @@ def equation_terms(model: pin.Model, data: pin.Data, q: np.ndarray, v: np.ndarra
 
 
 def mass_matrix(model: pin.Model, data: pin.Data, q: np.ndarray) -> np.ndarray:
-    """M(q), (nv, nv), both triangles [kg m^2]."""
+    """M(q), (nv, nv), both triangles [kg m^2], at q (nq,) [rad]."""
     upper = np.triu(pin.crba(model, data, q))
     mass: np.ndarray = upper + np.triu(upper, 1).T
     return mass

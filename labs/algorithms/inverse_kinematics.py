@@ -13,11 +13,16 @@ The third minimises |J q' - v|^2 + lambda^2 |q'|^2; since sigma / (sigma^2 + lam
 1 / (2 lambda), so is |q'| / |v|. (Nakamura and Hanafusa 1986; Wampler 1986.)
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import pinocchio as pin
+from scipy.optimize import least_squares
 
+from labs.algorithms.jacobian import ForwardKinematics, geometric_jacobian
+
+REACHED = 1e-3
+"""[m] A place is within reach if the frame comes as near as this."""
 RELATIVE_CUTOFF = 1e-12
 """Singular values below this share of the largest count as zero in the pseudo-inverse."""
 
@@ -87,3 +92,29 @@ def manipulability(jacobian: np.ndarray) -> tuple[np.ndarray, float]:
     product: sqrt(det(J J^T)) for m <= n (Yoshikawa 1985)."""
     sigma = np.linalg.svd(jacobian, compute_uv=False)
     return sigma, float(np.prod(sigma))
+
+
+def nearest_distance(
+    kinematics: ForwardKinematics,
+    target: np.ndarray,
+    starts: Iterable[np.ndarray],
+    lower: np.ndarray,
+    upper: np.ndarray,
+) -> float:
+    """The least |p_e(q) - p*| [m] to a place p* (3,) over lower <= q <= upper (n,), by
+    Gauss-Newton steps in a trust region (scipy.optimize.least_squares) from each start (n,) until
+    one is within REACHED. Such minima are local: what is found is at least the least distance."""
+    least = np.inf
+    for start in starts:
+        found = least_squares(
+            lambda q: kinematics.at(q).placement.translation - target,
+            np.clip(start, lower + 1e-6, upper - 1e-6),
+            lambda q: geometric_jacobian(kinematics.at(q))[:3],
+            (lower, upper),
+            ftol=1e-6,
+            xtol=1e-6,
+        )
+        least = min(least, float(np.linalg.norm(found.fun)))
+        if least <= REACHED:
+            break
+    return least

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from labs.algorithms.inverse_kinematics import joint_rates, scale_to_speed_limit
+from labs.algorithms.inverse_kinematics import REACHED, joint_rates, scale_to_speed_limit
 from labs.algorithms.jacobian import (
     analytical_jacobian,
     geometric_jacobian,
@@ -20,19 +20,28 @@ from labs.reactive_control.differential_kinematics.picture import (
     CAMERA,
     draw_columns,
     draw_ellipsoids,
+    draw_out_of_reach,
     draw_twist,
     draw_warning,
 )
 from labs.reactive_control.differential_kinematics.plots import (
     PLOTS,
     jacobian_fields,
+    reach_note,
     singular_values,
 )
-from labs.reactive_control.differential_kinematics.target import LAP, target_motion, task_velocity
+from labs.reactive_control.differential_kinematics.target import (
+    LAP,
+    nearest_reachable,
+    target_motion,
+    task_velocity,
+)
 from labs.scene import Scene
 
 SINGULARITY_WARNING = 0.05
 """A smallest singular value below this is called near a singularity."""
+SETTLED = 10
+"""World steps a target's way stays as it is before it is asked whether it is within reach."""
 MAX_CONDITION = 1e6
 """Shown for any condition number beyond it."""
 
@@ -58,6 +67,12 @@ class DifferentialState(State):
     """Time since the target was put there [s]."""
     peak: float = 0.0
     """Largest |q'| commanded so far [rad/s]."""
+    farthest: np.ndarray
+    """(3,) [m] where the target's way leads to; where it is, if it rests."""
+    settled: int = 0
+    """World steps since that changed."""
+    nearest: float = 0.0
+    """[m] how near to it the frame can come, as far as is known."""
 
 
 class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
@@ -92,6 +107,7 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
             applied=still,
             anchor=here.translation.copy(),
             orientation=here.rotation.copy(),
+            farthest=here.translation.copy(),
         )
 
     def step(
@@ -121,6 +137,11 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         model = params.arm.model
         moved = q + self.period * applied
         speed = float(np.linalg.norm(commanded))
+        farthest, _ = target_motion(params, anchor, LAP / 2)
+        settled = state.settled + 1 if np.array_equal(farthest, state.farthest) else 0
+        nearest = state.nearest if settled else 0.0
+        if settled == SETTLED and params.mode == "follow":
+            nearest = nearest_reachable(params, farthest, q)
         return DifferentialState(
             t=state.t + self.period,
             q=np.clip(moved, model.lowerPositionLimit, model.upperPositionLimit),
@@ -132,6 +153,9 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
             orientation=orientation.copy(),
             clock=clock + self.period if params.mode == "follow" and held is None else 0.0,
             peak=max(state.peak, speed) if params.mode == "follow" else 0.0,
+            farthest=farthest,
+            settled=settled,
+            nearest=nearest,
         )
 
     def measure(self, params: DifferentialParams, state: DifferentialState) -> Measurement:
@@ -145,7 +169,8 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         commanded = state.commanded if follows else rates
         target, _ = target_motion(params, state.anchor, state.clock)
         bias = geometric_jacobian_rate(chain, rates)[:3] @ rates
-        return {
+        short = {"short": state.nearest} if follows and state.nearest > REACHED else {}
+        return short | {
             "q": _posture(params, state),
             "rates": commanded,
             "speed": float(np.linalg.norm(commanded)),
@@ -171,6 +196,10 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         chain = params.kinematics.at(_posture(params, state))
         return jacobian_fields(params, chain, _rates(params, state))
 
+    def notes(self, params: DifferentialParams, state: DifferentialState) -> Mapping[str, str]:
+        """Whether the target can be reached."""
+        return {"within_reach": reach_note(params, state.nearest)}
+
     def draw(self, scene: Scene, params: DifferentialParams, state: DifferentialState) -> None:
         """The arm, the Jacobian's columns, the twist, ellipsoids, the target and a warning."""
         q = _posture(params, state)
@@ -186,6 +215,8 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         if params.mode == "follow":
             target, _ = target_motion(params, state.anchor, state.clock)
             scene.handle("target", target)
+            if state.nearest > REACHED:
+                draw_out_of_reach(scene, state.farthest, state.nearest)
             if params.reach > 0.0:
                 end, _ = target_motion(params, state.anchor, LAP / 2)
                 scene.trail("path", np.array([state.anchor, end]), "reference")

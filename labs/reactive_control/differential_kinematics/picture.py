@@ -50,6 +50,12 @@ def draw_ellipsoids(scene: Scene, which: str, tip: np.ndarray, linear: np.ndarra
         scene.ellipsoid("forces", tip, u * lengths, "force")
 
 
+def draw_out_of_reach(scene: Scene, place: np.ndarray, distance: float) -> None:
+    """That no posture brings the frame nearer to a place (3,) [m] than this distance [m]."""
+    above = place + np.array([0.0, 0.0, 0.1])
+    scene.label("out of reach", f"Out of reach by {distance:.2f} m", above)
+
+
 def draw_warning(scene: Scene, tip: np.ndarray, sigma_min: float) -> None:
     """That a singularity is near the end-effector at `tip` (3,) [m]."""
     scene.sphere("singular", tip, 0.03, "warning")

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labs.algorithms.inverse_kinematics import manipulability
+from labs.algorithms.inverse_kinematics import REACHED, manipulability
 from labs.algorithms.jacobian import PosedChain, analytical_jacobian, geometric_jacobian
-from labs.plots import Bars, Line, Matrix, Readout, TimeSeries
+from labs.plots import Bars, Line, Matrix, Note, Readout, TimeSeries
 from labs.reactive_control.differential_kinematics.params import DifferentialParams
 
 PLOTS = (
@@ -40,7 +40,9 @@ PLOTS = (
     Readout("manipulability", "Manipulability", ""),
     Readout("condition", "Condition number", ""),
     Readout("peak", "Fastest joint speed asked", "rad/s"),
+    Readout("short", "Target out of reach by", "m"),
     Readout("bias", "Acceleration at constant joint velocities", "m/s²"),
+    Note("Reach", "within_reach"),
 )
 
 
@@ -64,3 +66,16 @@ def singular_values(
 ) -> tuple[np.ndarray, float]:
     """Of the task's rows, for the joints that carry the frame; and their product."""
     return manipulability(jacobian[: params.rows, chain.supports])
+
+
+def reach_note(params: DifferentialParams, nearest: float) -> str:
+    """Whether the target can be reached, the frame coming as near as `nearest` [m]."""
+    if params.mode != "follow":
+        return "No target is followed."
+    if nearest <= REACHED:
+        return "Nothing keeps the frame from where the target is."
+    where = "At the far end of its way the" if params.reach > 0.0 else "The"
+    return (
+        f"{where} target is out of reach: no posture was found that brings "
+        f"the frame nearer to it than {nearest:.3f} m."
+    )

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
-from labs.algorithms.inverse_kinematics import clip_norm, pose_error
+from labs.algorithms.inverse_kinematics import clip_norm, nearest_distance, pose_error
 from labs.algorithms.jacobian import PosedChain
 from labs.reactive_control.differential_kinematics.params import DifferentialParams
 
@@ -11,6 +11,8 @@ MAX_CORRECTION, MAX_CORRECTION_TURN = 0.5, 1.0
 """[m/s], [rad/s] what the feedback of the error may ask of the end-effector."""
 LAP = 8.0
 """[s] the target's way out and back."""
+STARTS = 5
+"""Postures the search for the nearest one begins at, besides the present one."""
 
 
 def target_motion(
@@ -40,3 +42,13 @@ def task_velocity(
     error = params.gain * pose_error(chain.placement, pin.SE3(orientation, target))
     linear = velocity + clip_norm(error[:3], MAX_CORRECTION)
     return np.concatenate([linear, clip_norm(error[3:], MAX_CORRECTION_TURN)])
+
+
+def nearest_reachable(params: DifferentialParams, target: np.ndarray, q: np.ndarray) -> float:
+    """[m] how near the frame can come to a place (3,), looked for from q (n,) and STARTS other
+    postures."""
+    model = params.arm.model
+    lower, upper = model.lowerPositionLimit, model.upperPositionLimit
+    within = np.maximum(lower, -np.pi), np.minimum(upper, np.pi)
+    others = np.random.default_rng(0).uniform(*within, (STARTS, len(q)))
+    return nearest_distance(params.kinematics, target, [q, *others], lower, upper)

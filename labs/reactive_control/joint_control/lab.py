@@ -15,13 +15,9 @@ from labs.models.arms import load
 from labs.models.plant import Force, Plant, plant
 from labs.params import Value
 from labs.reactive_control.joint_control.disturbances import end_effector_force, measurement_noise
-from labs.reactive_control.joint_control.divergence import Menu, explain
-from labs.reactive_control.joint_control.params import (
-    CONTROL_PERIODS,
-    HIGHEST_KD,
-    INTEGRATION_STEPS,
-    JointParams,
-)
+from labs.reactive_control.joint_control.divergence import explain
+from labs.reactive_control.joint_control.linearisation import linear_loop, loops_along_reference
+from labs.reactive_control.joint_control.params import CONTROL_PERIODS, MENU, JointParams
 from labs.reactive_control.joint_control.plots import PLOTS, eigenvalue_fields
 from labs.reactive_control.joint_control.references import reference_motion
 from labs.reactive_control.joint_control.sampled_control import (
@@ -31,7 +27,6 @@ from labs.reactive_control.joint_control.sampled_control import (
     ticks,
     units,
 )
-from labs.reactive_control.joint_control.sampled_stability import LinearisedRobot, LinearLoop
 from labs.reactive_control.joint_control.step_response import StepResponse
 from labs.scene import Scene
 from labs.tasks.arm.trail import TRAIL_POINTS, TRAIL_STRIDE, append_row, draw_trail
@@ -231,7 +226,7 @@ class JointControl(Lab[JointParams, JointState]):
     def fields(self, params: JointParams, state: JointState) -> Mapping[str, np.ndarray]:
         """Eigenvalues of the loop linearised at rest at the reference: under continuous
         control, and of one control period as simulated."""
-        return eigenvalue_fields(_linear_loop(params, state), params.setting)
+        return eigenvalue_fields(linear_loop(params, state.q_ref), params.setting)
 
     def draw(self, scene: Scene, params: JointParams, state: JointState) -> None:
         """The arm, a ghost at the reference, where both end-effectors were, and the force."""
@@ -305,20 +300,9 @@ def _limit(robot: str, limited: bool) -> np.ndarray:
     return limit if limited else np.full_like(limit, np.inf)
 
 
-def _linear_loop(params: JointParams, state: JointState) -> LinearLoop:
-    """The loop at rest at the reference, the robot with its payload, the controller without."""
-    world, known = plant(params.robot, params.payload), plant(params.robot)
-    robot = LinearisedRobot.near(world.model, world.data, state.q_ref, params.friction)
-    return LinearLoop(robot, known.model, known.data, state.q_ref)
-
-
 def _stopped(params: JointParams, state: JointState) -> JointState:
     """The last sane state, and why it went no further."""
-    why = explain(
-        _linear_loop(params, state),
-        params.setting,
-        Menu(tuple(CONTROL_PERIODS), tuple(INTEGRATION_STEPS), HIGHEST_KD),
-    )
+    why = explain(loops_along_reference(params, state.q_ref), params.setting, MENU)
     stopped = copy.deepcopy(state)
     stopped.trouble = (
         f"Diverged at t = {state.t:.2f} s: a joint passed {SPEED_LIMIT:g} rad/s. {why}"

@@ -3,8 +3,8 @@
 from labs.algorithms.integrators import INTEGRATORS
 from labs.algorithms.joint_control import Gains
 from labs.params import Group, Params
+from labs.reactive_control.joint_control.divergence import Menu
 from labs.reactive_control.joint_control.references import cycles_per_second
-from labs.reactive_control.joint_control.sampled_control import UNIT, time_between_ticks, units
 from labs.reactive_control.joint_control.sampled_stability import Setting
 from labs.tasks.arm.params import robot_choice
 from labs.tasks.arm.postures import POSED_ARMS
@@ -16,7 +16,7 @@ CONTROLLERS = {
     "computed-torque": "Computed torque (beyond the notes)",
 }
 REFERENCES = {"set-point": "Set point", "sinusoid": "Sinusoid", "minimum-jerk": "Minimum jerk"}
-HIGHEST_KD = 200.0
+HIGHEST_KP, HIGHEST_KD = 2000.0, 200.0
 CONTROL_PERIODS = {
     0.001: "1 ms",
     0.002: "2 ms",
@@ -34,6 +34,7 @@ INTEGRATION_STEPS = {
     0.005: "5 ms",
     0.01: "10 ms",
 }
+MENU = Menu(tuple(CONTROL_PERIODS), tuple(INTEGRATION_STEPS), HIGHEST_KP, HIGHEST_KD)
 DIRECTIONS = {"x": "+x", "y": "+y", "z": "+z", "-x": "-x", "-y": "-y", "-z": "-z"}
 
 ROBOT = Group("Robot", effect="restart")
@@ -63,7 +64,7 @@ class JointParams(Params):
     """How far every joint starts from where the reference starts."""
     controller: str = CONTROLLER.choice("pd-gravity", CONTROLLERS, "Controller")
     """The law that turns the state and the reference into torques."""
-    kp: float = CONTROLLER.knob(200.0, 0.0, 2000.0, "k_p", "N·m/rad", scale="log")
+    kp: float = CONTROLLER.knob(200.0, 0.0, HIGHEST_KP, "k_p", "N·m/rad", scale="log")
     """Torque per error. In computed torque an acceleration per error, 1/s²."""
     ki: float = CONTROLLER.knob(0.0, 0.0, 2000.0, "k_i", "N·m/(rad·s)", scale="log")
     """Torque per integrated error, PID only. At zero the integral is emptied."""
@@ -109,5 +110,4 @@ class JointParams(Params):
     @property
     def setting(self) -> Setting:
         """The loop, for the analysis of its stability."""
-        period = time_between_ticks(units(self.control_period), units(self.step)) * UNIT
-        return Setting(self.controller, self.gains, period, self.integrator, self.step)
+        return Setting(self.controller, self.gains, self.control_period, self.integrator, self.step)

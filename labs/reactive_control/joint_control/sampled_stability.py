@@ -22,7 +22,8 @@ import pinocchio as pin
 
 from labs.algorithms.discretisation import zero_order_hold, zero_order_hold_integrated
 from labs.algorithms.equation_of_motion import mass_matrix
-from labs.algorithms.joint_control import Gains, linearise_law
+from labs.algorithms.joint_control import CONTROL_LAWS, Gains, linearise_law
+from labs.reactive_control.joint_control.sampled_control import UNIT, time_between_ticks, units
 
 GROWS = 1e-3
 """[1/s] growth below this is not told from none: at a pole on the stability boundary, rounding
@@ -40,6 +41,8 @@ class LinearisedRobot:
     mass: np.ndarray
     friction: np.ndarray
     gravity: np.ndarray
+    load: np.ndarray
+    """g (nv,) [N m]: the torque that holds it there."""
 
     @classmethod
     def near(
@@ -47,7 +50,8 @@ class LinearisedRobot:
     ) -> "LinearisedRobot":
         """Linearised at rest at q (nq,), with viscous `friction` [N m s/rad] at every joint."""
         gravity = pin.computeGeneralizedGravityDerivatives(model, data, q)
-        return cls(mass_matrix(model, data, q), friction * np.eye(model.nv), gravity.copy())
+        load = pin.computeGeneralizedGravity(model, data, q).copy()
+        return cls(mass_matrix(model, data, q), friction * np.eye(model.nv), gravity.copy(), load)
 
     def dynamics(self) -> tuple[np.ndarray, np.ndarray]:
         """A (2n, 2n) and B (2n, n)."""
@@ -64,14 +68,19 @@ class LinearisedRobot:
 
 @dataclass(frozen=True)
 class Setting:
-    """What a loop consists of, besides the robot. Times in seconds; `period` is the time
-    between ticks and a whole number of steps."""
+    """What a loop consists of, besides the robot. Times in seconds."""
 
     controller: str
     gains: Gains
-    period: float
+    control_period: float
+    """As it is set, at least the time between two ticks."""
     integrator: str
     step: float
+
+    @property
+    def period(self) -> float:
+        """Between two ticks: the control period rounded up to whole integration steps."""
+        return time_between_ticks(units(self.control_period), units(self.step)) * UNIT
 
 
 @dataclass(frozen=True)
@@ -114,6 +123,21 @@ class LinearLoop:
         """sigma [1/s] of the sampled loop."""
         radius = float(np.abs(self.multipliers(setting, exact=exact)).max())
         return float(np.log(max(radius, 1e-300))) / setting.period
+
+    def sag(self, setting: Setting) -> float:
+        """[rad] how far from q a joint comes to rest: what the law's torque at q lacks of the
+        load, over the stiffness, (K_q + G) dq = tau - g. None with an integral; infinite without
+        any stiffness."""
+        law = linearise_law(setting.controller, self.model, self.data, setting.gains, self.q)
+        zero = np.zeros_like(self.q)
+        torque = CONTROL_LAWS[setting.controller](self.model, self.data, setting.gains)
+        lacking = torque(self.q, zero, zero, self.q, zero, zero) - self.robot.load
+        if law.k_z.any() or np.abs(lacking).max() < 1e-9:
+            return 0.0
+        stiffness = law.k_q + self.robot.gravity
+        if np.linalg.matrix_rank(stiffness) < len(zero):
+            return np.inf
+        return float(np.abs(np.linalg.solve(stiffness, lacking)).max())
 
     def diagnose(self, setting: Setting) -> Diagnosis:
         """Which of the three loops is the first to be at fault."""

@@ -7,11 +7,13 @@ from scipy.optimize import lsq_linear
 
 from labs.algorithms.inverse_kinematics import (
     INVERSE_KINEMATICS_METHODS,
+    REACHED,
     clip_norm,
     damped_least_squares,
     jacobian_transpose,
     joint_rates,
     manipulability,
+    nearest_distance,
     pose_error,
     pseudo_inverse,
     scale_to_speed_limit,
@@ -149,3 +151,33 @@ def test_manipulability_is_the_root_of_a_determinant(m: int, n: int, sigma: list
     np.testing.assert_allclose(found, sigma, rtol=1e-12)
     gram = j @ j.T if m <= n else j.T @ j
     assert product == pytest.approx(np.sqrt(np.linalg.det(gram)), rel=1e-10)
+
+
+def test_the_nearest_distance_of_a_planar_arm_in_closed_form() -> None:
+    """Links of 0.4 and 0.3 m on a slide of 0.3 m: a ring, extended up and down."""
+    arm = load("scara")
+    kinematics, model = ForwardKinematics(arm.model, arm.tip), arm.model
+    limits = model.lowerPositionLimit, model.upperPositionLimit
+    height = kinematics.at(arm.home).placement.translation[2]
+    top = height + limits[1][2] - arm.home[2]
+    starts = [arm.home, arm.home + np.array([0.5, -0.7, 0.0, 0.0])]
+    for target, wanted in (
+        ([2.0, 0.0, height], 1.3),
+        ([0.0, 0.7, height], 0.0),
+        ([0.5, 0.2, top + 0.4], 0.4),
+        ([1.0, 0.0, top + 0.4], 0.5),
+    ):
+        found = nearest_distance(kinematics, np.array(target), starts, *limits)
+        assert found == pytest.approx(wanted, abs=REACHED)
+
+
+@pytest.mark.parametrize("robot", ["ur5", "panda", "scara"])
+def test_no_place_a_posture_reaches_is_out_of_reach(robot: str) -> None:
+    arm, rng = load(robot), np.random.default_rng(5)
+    kinematics, model = ForwardKinematics(arm.model, arm.tip), arm.model
+    limits = model.lowerPositionLimit, model.upperPositionLimit
+    within = np.maximum(limits[0], -np.pi), np.minimum(limits[1], np.pi)
+    for q in rng.uniform(*within, (30, model.nq)):
+        place = kinematics.at(q).placement.translation
+        starts = [arm.home, *rng.uniform(*within, (5, model.nq))]
+        assert nearest_distance(kinematics, place, starts, *limits) <= REACHED

@@ -250,3 +250,37 @@ def test_what_a_step_takes_in_is_left_alone() -> None:
     LAB.step(params, Inputs(handles={"target": (0.4, 0.2, 0.3)}), state)
     for name, value in vars(state).items():
         np.testing.assert_array_equal(value, getattr(kept, name))
+
+
+@pytest.mark.parametrize("robot", ["ur5", "panda", "scara"])
+def test_a_target_out_of_reach_is_said_to_be_and_how_near_one_gets(robot: str) -> None:
+    """2 m away: the arm stretches towards it and rests at the distance that was named."""
+    params = parameters({"mode": "follow", "damping": 0.02}, robot=robot)
+    state = LAB.init(params, np.random.default_rng(0))
+    assert "short" not in LAB.measure(params, state)
+    for _ in range(1500):
+        state = LAB.step(params, Inputs(handles={"target": (2.0, 0.0, 0.4)}), state)
+    measured = LAB.measure(params, state)
+    assert measured["short"] == pytest.approx(measured["error"], abs=2e-3)
+    note = LAB.notes(params, state)["within_reach"]
+    assert note.startswith("The target is out of reach")
+    assert f"{measured['short']:.3f} m" in note
+    for _ in range(20):  # and when it is brought back
+        state = LAB.step(params, Inputs(handles={"target": (0.4, 0.1, 0.3)}), state)
+    assert "short" not in LAB.measure(params, state)
+    assert "out of reach" not in LAB.notes(params, state)["within_reach"]
+
+
+def test_a_target_that_leaves_for_a_place_out_of_reach_says_so_at_once() -> None:
+    params = parameters(ARTICLE.settings["Damping tames it"])
+    state = LAB.init(params, np.random.default_rng(0))
+    for _ in range(20):
+        state = LAB.step(params, Inputs(), state)
+    measured = LAB.measure(params, state)
+    assert measured["error"] < 0.01
+    assert measured["short"] == pytest.approx(0.09, abs=0.005)
+    assert LAB.notes(params, state)["within_reach"].startswith("At the far end of its way")
+    nearer = params.change({"reach": 0.1})
+    for _ in range(20):
+        state = LAB.step(nearer, Inputs(), state)
+    assert "short" not in LAB.measure(nearer, state)

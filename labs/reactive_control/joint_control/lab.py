@@ -17,7 +17,11 @@ from labs.params import Value
 from labs.reactive_control.joint_control.disturbances import end_effector_force, measurement_noise
 from labs.reactive_control.joint_control.divergence import explain
 from labs.reactive_control.joint_control.linearisation import linear_loop, loops_along_reference
-from labs.reactive_control.joint_control.params import CONTROL_PERIODS, MENU, JointParams
+from labs.reactive_control.joint_control.params import (
+    AVAILABLE_SETTINGS,
+    CONTROL_PERIODS,
+    JointParams,
+)
 from labs.reactive_control.joint_control.plots import PLOTS, eigenvalue_fields
 from labs.reactive_control.joint_control.references import reference_motion
 from labs.reactive_control.joint_control.sampled_control import (
@@ -226,7 +230,7 @@ class JointControl(Lab[JointParams, JointState]):
     def fields(self, params: JointParams, state: JointState) -> Mapping[str, np.ndarray]:
         """Eigenvalues of the loop linearised at rest at the reference: under continuous
         control, and of one control period as simulated."""
-        return eigenvalue_fields(linear_loop(params, state.q_ref), params.setting)
+        return eigenvalue_fields(linear_loop(params, state.q_ref), params.loop_settings)
 
     def draw(self, scene: Scene, params: JointParams, state: JointState) -> None:
         """The arm, a ghost at the reference, where both end-effectors were, and the force."""
@@ -259,7 +263,7 @@ class JointControl(Lab[JointParams, JointState]):
             held=held,
             integrate=INTEGRATORS[params.integrator].step,
             h=params.step,
-            integral_gain=params.setting.period if params.integrates else 0.0,
+            integral_gain=params.loop_settings.period if params.integrates else 0.0,
         )
 
     def _response(
@@ -302,7 +306,9 @@ def _limit(robot: str, limited: bool) -> np.ndarray:
 
 def _stopped(params: JointParams, state: JointState) -> JointState:
     """The last sane state, and why it went no further."""
-    why = explain(loops_along_reference(params, state.q_ref), params.setting, MENU)
+    why = explain(
+        loops_along_reference(params, state.q_ref), params.loop_settings, AVAILABLE_SETTINGS
+    )
     stopped = copy.deepcopy(state)
     stopped.trouble = (
         f"Diverged at t = {state.t:.2f} s: a joint passed {SPEED_LIMIT:g} rad/s. {why}"

@@ -3,9 +3,9 @@
 from labs.algorithms.integrators import INTEGRATORS
 from labs.algorithms.joint_control import Gains
 from labs.params import Group, Params
-from labs.reactive_control.joint_control.divergence import Menu
+from labs.reactive_control.joint_control.divergence import AvailableSettings
 from labs.reactive_control.joint_control.references import cycles_per_second
-from labs.reactive_control.joint_control.sampled_stability import Setting
+from labs.reactive_control.joint_control.sampled_stability import LoopSettings
 from labs.tasks.arm.params import robot_choice
 from labs.tasks.arm.postures import POSED_ARMS
 
@@ -34,7 +34,9 @@ INTEGRATION_STEPS = {
     0.005: "5 ms",
     0.01: "10 ms",
 }
-MENU = Menu(tuple(CONTROL_PERIODS), tuple(INTEGRATION_STEPS), HIGHEST_KP, HIGHEST_KD)
+AVAILABLE_SETTINGS = AvailableSettings(
+    tuple(CONTROL_PERIODS), tuple(INTEGRATION_STEPS), HIGHEST_KP, HIGHEST_KD
+)
 DIRECTIONS = {"x": "+x", "y": "+y", "z": "+z", "-x": "-x", "-y": "-y", "-z": "-z"}
 
 ROBOT = Group("Robot", effect="restart")
@@ -108,6 +110,8 @@ class JointParams(Params):
         return self.controller == "pid" and self.ki > 0.0
 
     @property
-    def setting(self) -> Setting:
+    def loop_settings(self) -> LoopSettings:
         """The loop, for the analysis of its stability."""
-        return Setting(self.controller, self.gains, self.control_period, self.integrator, self.step)
+        return LoopSettings(
+            self.controller, self.gains, self.control_period, self.integrator, self.step
+        )

@@ -25,11 +25,11 @@ from labs.algorithms.equation_of_motion import mass_matrix
 from labs.algorithms.joint_control import CONTROL_LAWS, Gains, linearise_law
 from labs.reactive_control.joint_control.sampled_control import UNIT, time_between_ticks, units
 
-GROWS = 1e-3
+GROWTH_TOLERANCE = 1e-3
 """[1/s] growth below this is not told from none: at a pole on the stability boundary, rounding
 alone is worth that much."""
 
-NEARLY = 0.6
+EXPLAINING_SHARE = 0.6
 """A loop that grows at least this fast, as a share of the simulated one, explains it. With
 k_d = 0 and T = h explicit Euler grows twice as fast as holding the torque alone would."""
 
@@ -67,7 +67,7 @@ class LinearisedRobot:
 
 
 @dataclass(frozen=True)
-class Setting:
+class LoopSettings:
     """What a loop consists of, besides the robot. Times in seconds."""
 
     controller: str
@@ -103,34 +103,36 @@ class LinearLoop:
     data: pin.Data
     q: np.ndarray
 
-    def poles(self, setting: Setting) -> np.ndarray:
+    def poles(self, settings: LoopSettings) -> np.ndarray:
         """Eigenvalues [1/s] of the loop under continuous control."""
         a, b = self.robot.dynamics()
-        return np.linalg.eigvals(self._closed(setting, a, b, 1.0, sampled=False))
+        return np.linalg.eigvals(self._closed(settings, a, b, 1.0, sampled=False))
 
-    def multipliers(self, setting: Setting, *, exact: bool = False) -> np.ndarray:
+    def multipliers(self, settings: LoopSettings, *, exact: bool = False) -> np.ndarray:
         """Eigenvalues of the map over one control period, the robot's motion between ticks
         integrated as set, or exactly."""
         a, b = self.robot.dynamics()
         phi, gamma = (
-            zero_order_hold(a, b, setting.period)
+            zero_order_hold(a, b, settings.period)
             if exact
-            else zero_order_hold_integrated(setting.integrator, setting.step, a, b, setting.period)
+            else zero_order_hold_integrated(
+                settings.integrator, settings.step, a, b, settings.period
+            )
         )
-        return np.linalg.eigvals(self._closed(setting, phi, gamma, setting.period, sampled=True))
+        return np.linalg.eigvals(self._closed(settings, phi, gamma, settings.period, sampled=True))
 
-    def growth(self, setting: Setting, *, exact: bool = False) -> float:
+    def growth(self, settings: LoopSettings, *, exact: bool = False) -> float:
         """sigma [1/s] of the sampled loop."""
-        radius = float(np.abs(self.multipliers(setting, exact=exact)).max())
-        return float(np.log(max(radius, 1e-300))) / setting.period
+        radius = float(np.abs(self.multipliers(settings, exact=exact)).max())
+        return float(np.log(max(radius, 1e-300))) / settings.period
 
-    def sag(self, setting: Setting) -> float:
+    def sag(self, settings: LoopSettings) -> float:
         """[rad] how far from q a joint comes to rest: what the law's torque at q lacks of the
         load, over the stiffness, (K_q + G) dq = tau - g. None with an integral; infinite without
         any stiffness."""
-        law = linearise_law(setting.controller, self.model, self.data, setting.gains, self.q)
+        law = linearise_law(settings.controller, self.model, self.data, settings.gains, self.q)
         zero = np.zeros_like(self.q)
-        torque = CONTROL_LAWS[setting.controller](self.model, self.data, setting.gains)
+        torque = CONTROL_LAWS[settings.controller](self.model, self.data, settings.gains)
         lacking = torque(self.q, zero, zero, self.q, zero, zero) - self.robot.load
         if law.k_z.any() or np.abs(lacking).max() < 1e-9:
             return 0.0
@@ -139,21 +141,29 @@ class LinearLoop:
             return np.inf
         return float(np.abs(np.linalg.solve(stiffness, lacking)).max())
 
-    def diagnose(self, setting: Setting) -> Diagnosis:
+    def diagnose(self, settings: LoopSettings) -> Diagnosis:
         """Which of the three loops is the first to be at fault."""
-        continuous = float(self.poles(setting).real.max())
-        sampled, simulated = self.growth(setting, exact=True), self.growth(setting)
+        continuous = float(self.poles(settings).real.max())
+        sampled, simulated = self.growth(settings, exact=True), self.growth(settings)
         rates = {"gains": continuous, "period": sampled, "integrator": simulated}
         fault = ""
-        if simulated > GROWS:
-            fault = next(name for name, rate in rates.items() if rate >= NEARLY * simulated)
+        if simulated > GROWTH_TOLERANCE:
+            fault = next(
+                name for name, rate in rates.items() if rate >= EXPLAINING_SHARE * simulated
+            )
         return Diagnosis(continuous, sampled, simulated, fault)
 
     def _closed(
-        self, setting: Setting, phi: np.ndarray, gamma: np.ndarray, period: float, *, sampled: bool
+        self,
+        settings: LoopSettings,
+        phi: np.ndarray,
+        gamma: np.ndarray,
+        period: float,
+        *,
+        sampled: bool,
     ) -> np.ndarray:
         """x and z together: u = -K x + k_z z, and z' = -dq or z+ = z - T dq."""
-        law = linearise_law(setting.controller, self.model, self.data, setting.gains, self.q)
+        law = linearise_law(settings.controller, self.model, self.data, settings.gains, self.q)
         n = len(self.q)
         from_x = phi - gamma @ np.hstack([law.k_q, law.k_v])
         if not law.k_z.any():

@@ -1,9 +1,8 @@
 """What is advised where a run diverged: followed, the run does not diverge."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 import pytest
@@ -14,21 +13,21 @@ from labs.reactive_control.joint_control.divergence import remedies
 from labs.reactive_control.joint_control.lab import JointState
 from labs.reactive_control.joint_control.linearisation import loops_along_reference
 from labs.reactive_control.joint_control.params import (
+    AVAILABLE_SETTINGS,
     CONTROLLERS,
-    MENU,
     REFERENCES,
     JointParams,
 )
 from labs.tasks.arm.postures import POSED_ARMS
 from tests.labs.reactive_control.joint_control.runs import final_state, parameters
 
-CHOICES: Mapping[str, Mapping[str, Any]] = {
+CHOICES: Mapping[str, Iterable[str]] = {
     "robot": POSED_ARMS,
     "reference": REFERENCES,
     "controller": CONTROLLERS,
     "integrator": INTEGRATORS,
 }
-SETTING = ("controller", "control_period", "integrator", "step")
+SETTINGS = ("controller", "control_period", "integrator", "step")
 
 
 def diverging(rng: np.random.Generator) -> tuple[JointParams, JointState]:
@@ -49,8 +48,8 @@ def diverging(rng: np.random.Generator) -> tuple[JointParams, JointState]:
             payload=round(rng.uniform(0.0, 10.0), 1) if rng.random() < 0.3 else 0.0,
             friction=round(rng.uniform(0.0, 20.0), 1) if rng.random() < 0.3 else 0.0,
             torque_limits=bool(rng.random() < 0.3),
-            control_period=float(rng.choice(list(MENU.periods))),
-            step=float(rng.choice([h for h in MENU.steps if h >= 0.002])),
+            control_period=float(rng.choice(list(AVAILABLE_SETTINGS.periods))),
+            step=float(rng.choice([h for h in AVAILABLE_SETTINGS.steps if h >= 0.002])),
         )
         stopped = final_state(params, 0.5)
         if stopped.trouble:
@@ -63,13 +62,15 @@ def check_advice(seed: int, count: int, seconds: float) -> None:
     rng, advised = np.random.default_rng(seed), 0
     for _ in range(count):
         params, stopped = diverging(rng)
-        proposals = remedies(loops_along_reference(params, stopped.q_ref), params.setting, MENU)
+        proposals = remedies(
+            loops_along_reference(params, stopped.q_ref), params.loop_settings, AVAILABLE_SETTINGS
+        )
         advised += bool(proposals)
         for proposal in proposals:
             assert proposal.text in stopped.trouble
             for setting in proposal.settings:
                 followed = params.change(
-                    {name: getattr(setting, name) for name in SETTING} | asdict(setting.gains)
+                    {name: getattr(setting, name) for name in SETTINGS} | asdict(setting.gains)
                 )
                 ended = final_state(followed, seconds)
                 assert not ended.trouble, (proposal.text, params)

@@ -10,22 +10,28 @@ from scipy.optimize import fsolve
 from labs.algorithms.integrators import INTEGRATORS
 from labs.algorithms.joint_control import CONTROL_LAWS, Gains
 from labs.models.plant import plant
-from labs.reactive_control.joint_control.divergence import MARGIN, Menu, explain, remedies, stable
+from labs.reactive_control.joint_control.divergence import (
+    MARGIN,
+    AvailableSettings,
+    explain,
+    remedies,
+    robustly_stable,
+)
 from labs.reactive_control.joint_control.sampled_control import SampledLoop, simulate_sampled
 from labs.reactive_control.joint_control.sampled_stability import (
-    GROWS,
+    GROWTH_TOLERANCE,
     LinearisedRobot,
     LinearLoop,
-    Setting,
+    LoopSettings,
 )
 
-DEFAULT = Setting("pd-gravity", Gains(200.0, 0.0, 30.0), 1e-3, "semi-implicit-euler", 1e-3)
+DEFAULT = LoopSettings("pd-gravity", Gains(200.0, 0.0, 30.0), 1e-3, "semi-implicit-euler", 1e-3)
 UNSTABLE = {
     "gains": replace(DEFAULT, controller="pid", gains=Gains(200.0, 2000.0, 10.0)),
     "period": replace(DEFAULT, control_period=0.02, integrator="rk4"),
     "integrator": replace(DEFAULT, gains=Gains(200.0, 0.0, 0.0), integrator="explicit-euler"),
 }
-MENU = Menu(
+AVAILABLE = AvailableSettings(
     (0.001, 0.002, 0.005, 0.01, 0.02, 0.05), (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3), 2000.0, 200.0
 )
 
@@ -38,7 +44,7 @@ def linear(robot: str = "ur5", payload: float = 0.0, friction: float = 0.0) -> L
     )
 
 
-def growth_of_the_robot(setting: Setting, start: float, seconds: float) -> float:
+def growth_of_the_robot(setting: LoopSettings, start: float, seconds: float) -> float:
     """Measured on the nonlinear UR5 by the power method: the growth rate of a tiny deviation
     from rest at home, scaled back to `start` after every control period."""
     world = plant("ur5")
@@ -136,7 +142,7 @@ def test_each_verdict_and_its_growth_hold_for_the_nonlinear_robot(fault: str) ->
             diagnosis.continuous, rel=0.05
         )
     else:
-        assert diagnosis.continuous < GROWS
+        assert diagnosis.continuous < GROWTH_TOLERANCE
     if fault == "period":
         assert growth_of_the_robot(nearly_exact, 1e-7, 1.0) == pytest.approx(
             diagnosis.sampled, rel=0.03
@@ -147,7 +153,7 @@ def test_each_verdict_and_its_growth_hold_for_the_nonlinear_robot(fault: str) ->
 
 @pytest.mark.parametrize("fault", UNSTABLE)
 def test_what_is_proposed_works_on_the_nonlinear_robot(fault: str) -> None:
-    proposals = remedies([linear()], UNSTABLE[fault], MENU)
+    proposals = remedies([linear()], UNSTABLE[fault], AVAILABLE)
     assert len(proposals) == 2
     for setting in {setting for proposal in proposals for setting in proposal.settings}:
         if setting.controller == "pid" and setting.gains.ki == 0.0:
@@ -162,80 +168,82 @@ def test_a_proposed_step_is_tried_with_the_control_period_it_makes() -> None:
     assert replace(setting, step=1e-3).period == pytest.approx(5e-3)
     setting = replace(UNSTABLE["integrator"], control_period=5e-3, step=5e-3)
     setting = replace(setting, gains=Gains(200.0, 0.0, 0.97))
-    changes = [s for proposal in remedies([linear()], setting, MENU) for s in proposal.settings]
+    changes = [
+        s for proposal in remedies([linear()], setting, AVAILABLE) for s in proposal.settings
+    ]
     assert [change.step for change in changes] == [5e-3, 5e-4]
     assert all(change.control_period == 5e-3 for change in changes)
 
 
 def test_a_proposed_control_period_is_one_that_can_be_chosen() -> None:
     setting = replace(UNSTABLE["period"], step=2e-3)
-    proposal = remedies([linear()], setting, MENU)[0]
+    proposal = remedies([linear()], setting, AVAILABLE)[0]
     assert proposal.text == "a control period of 2 ms"
     assert [change.control_period for change in proposal.settings] == [0.002]
 
 
 def test_a_proposed_gain_is_no_more_cautious_than_its_margin() -> None:
     loop = linear()
-    less_integral = remedies([loop], UNSTABLE["gains"], MENU)[0].settings[-1]
+    less_integral = remedies([loop], UNSTABLE["gains"], AVAILABLE)[0].settings[-1]
     bolder = replace(
         less_integral, gains=replace(less_integral.gains, ki=1.05 * less_integral.gains.ki)
     )
-    assert stable([loop], less_integral)
-    assert not stable([loop], bolder)
+    assert robustly_stable([loop], less_integral)
+    assert not robustly_stable([loop], bolder)
     for fault in ("period", "integrator"):
-        damping = remedies([loop], UNSTABLE[fault], MENU)[-1]
+        damping = remedies([loop], UNSTABLE[fault], AVAILABLE)[-1]
         assert damping.text.startswith("k_d")
         ends = [setting.gains.kd for setting in damping.settings]
         for kd, factor in zip(ends, (0.9, 1.1), strict=True):
             inside = replace(UNSTABLE[fault], gains=Gains(200.0, 0.0, kd))
-            assert stable([loop], inside)
+            assert robustly_stable([loop], inside)
             if 0.0 < kd < 200.0:
                 outside = replace(inside, gains=Gains(200.0, 0.0, factor * kd))
-                assert not stable([loop], outside)
+                assert not robustly_stable([loop], outside)
 
 
-DIVERGING_BY_DAMPING = Setting("pid", Gains(330.0, 0.0, 60.0), 0.01, "explicit-euler", 0.01)
+DIVERGING_BY_DAMPING = LoopSettings("pid", Gains(330.0, 0.0, 60.0), 0.01, "explicit-euler", 0.01)
 """With explicit Euler at 10 ms too little damping is as bad as too much."""
 
 
 def test_a_stable_interval_is_named_by_both_ends() -> None:
     loop, setting = linear(), DIVERGING_BY_DAMPING
     grows = {
-        kd: loop.growth(replace(setting, gains=Gains(330.0, 0.0, kd))) > GROWS
+        kd: loop.growth(replace(setting, gains=Gains(330.0, 0.0, kd))) > GROWTH_TOLERANCE
         for kd in (1.5, 8.0, 60.0)
     }
     assert grows == {1.5: True, 8.0: False, 60.0: True}
     low, high = (
         s.gains.kd
-        for proposal in remedies([loop], setting, MENU)
+        for proposal in remedies([loop], setting, AVAILABLE)
         if proposal.text.startswith("k_d from")
         for s in proposal.settings
     )
     assert 3.3 * MARGIN < low < high < 15.0
     for kd in np.linspace(low, high, 12):
-        assert loop.growth(replace(setting, gains=Gains(330.0, 0.0, kd))) <= GROWS
-    assert f"k_d from {low:g} to {high:g}" in explain([loop], setting, MENU)
+        assert loop.growth(replace(setting, gains=Gains(330.0, 0.0, kd))) <= GROWTH_TOLERANCE
+    assert f"k_d from {low:g} to {high:g}" in explain([loop], setting, AVAILABLE)
 
 
 def test_where_nothing_helps_nothing_is_proposed() -> None:
     """No law of these holds an upright arm by damping alone."""
-    only_slow = Menu((0.05,), (0.01,), 0.02, 0.02)
+    only_slow = AvailableSettings((0.05,), (0.01,), 0.02, 0.02)
     setting = replace(UNSTABLE["gains"], control_period=0.05, step=0.01)
     assert remedies([linear()], setting, only_slow) == []
     sentence = explain([linear()], setting, only_slow)
     assert sentence.endswith("No stable setting was found near this one.")
     assert "Try" not in sentence
-    assert "Try" not in explain([linear()], DEFAULT, MENU)
+    assert "Try" not in explain([linear()], DEFAULT, AVAILABLE)
 
 
 def test_a_loop_that_needs_its_motors_to_survive_the_integrator_is_not_proposed() -> None:
     """Friction of 19 at the wrist and explicit Euler with 10 ms: M - h b < -M. Stiff feedback
     makes the linear loop stable, and with a motor at its limit it is not."""
     loop = linear(payload=2.8, friction=18.8)
-    setting = Setting("pid", Gains(1000.0, 0.0, 0.5), 0.002, "explicit-euler", 0.01)
+    setting = LoopSettings("pid", Gains(1000.0, 0.0, 0.5), 0.002, "explicit-euler", 0.01)
     assert loop.growth(setting) < -1.0
     assert loop.growth(replace(setting, controller="open-loop")) > 10.0
-    assert not stable([loop], setting)
+    assert not robustly_stable([loop], setting)
 
 
 def test_the_sag_is_where_the_robot_rests() -> None:
@@ -265,19 +273,19 @@ def test_the_default_is_stable_for_every_robot() -> None:
 
 def test_explicit_euler_needs_damping_of_h_times_k_p() -> None:
     """v+ = v - h/m (k_p q + k_d v), q+ = q + h v has |z|^2 = 1 - h k_d/m + h^2 k_p/m."""
-    sentence = explain([linear()], UNSTABLE["integrator"], MENU)
+    sentence = explain([linear()], UNSTABLE["integrator"], AVAILABLE)
     assert "Explicit Euler with 1 ms" in sentence
     assert "Semi-implicit Euler or k_d from 0.32 to 120." in sentence
 
 
 def test_the_sentences_name_the_fault() -> None:
-    assert "The gains are at fault" in explain([linear()], UNSTABLE["gains"], MENU)
-    assert "k_i of at most" in explain([linear()], UNSTABLE["gains"], MENU)
-    sentence = explain([linear()], UNSTABLE["period"], MENU)
+    assert "The gains are at fault" in explain([linear()], UNSTABLE["gains"], AVAILABLE)
+    assert "k_i of at most" in explain([linear()], UNSTABLE["gains"], AVAILABLE)
+    sentence = explain([linear()], UNSTABLE["period"], AVAILABLE)
     assert "The control period is at fault: with continuous control the error would not grow" in (
         sentence
     )
     assert "Try a control period of 2 ms or k_d from 3.6 to 6.2." in sentence
-    open_loop = explain([linear()], replace(DEFAULT, controller="open-loop"), MENU)
+    open_loop = explain([linear()], replace(DEFAULT, controller="open-loop"), AVAILABLE)
     assert "Nothing feeds the error back" in open_loop
-    assert "stable" in explain([linear()], DEFAULT, MENU)
+    assert "stable" in explain([linear()], DEFAULT, AVAILABLE)

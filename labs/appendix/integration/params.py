@@ -27,7 +27,7 @@ IMPLICIT_METHODS = {
 }
 
 SYSTEM = Group("System", effect="restart")
-METHODS = Group("Methods", effect="solve")
+STEPPING = Group("Methods", effect="solve")
 
 
 class IntegrationParams(Params):
@@ -41,11 +41,11 @@ class IntegrationParams(Params):
         0.0, 0.0, 5.0, "b", "N·m·s/rad", "Friction", scale="log", effect="solve"
     )
     """Viscous, at every hinge. It moves the eigenvalues to the left."""
-    h: float = METHODS.knob(0.04, 0.002, 1.0, "h", "s", "Step", scale="log", effect="live")
+    h: float = STEPPING.knob(0.04, 0.002, 1.0, "h", "s", "Step", scale="log", effect="live")
     """Of all methods alike. A pendulum stands still between two steps."""
-    implicit: str = METHODS.choice("implicit-midpoint", IMPLICIT_METHODS, "Implicit method")
+    implicit: str = STEPPING.choice("implicit-midpoint", IMPLICIT_METHODS, "Implicit method")
     """Which one the gray pendulum follows; its stages are found by Newton's method."""
-    tableau: str = METHODS.text("0 |\n1/3 | 1/3\n2/3 | 0 2/3\n| 1/4 0 3/4", "Your tableau", rows=6)
+    tableau: str = STEPPING.text("0 |\n1/3 | 1/3\n2/3 | 0 2/3\n| 1/4 0 3/4", "Your tableau", rows=6)
     """A row a stage, c | a ..., then | b ... at the end. Fractions go, and so do weights on and
     above the diagonal (implicit)."""
 

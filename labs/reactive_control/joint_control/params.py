@@ -3,8 +3,8 @@
 from labs.algorithms.integrators import INTEGRATORS
 from labs.algorithms.joint_control import Gains
 from labs.params import Group, Params
-from labs.reactive_control.joint_control.divergence import AvailableSettings
 from labs.reactive_control.joint_control.references import cycles_per_second
+from labs.reactive_control.joint_control.remedies import AvailableSettings
 from labs.reactive_control.joint_control.sampled_stability import LoopSettings
 from labs.tasks.arm.params import robot_choice
 from labs.tasks.arm.postures import POSED_ARMS

@@ -29,6 +29,11 @@ def units(seconds: float) -> int:
     return round(seconds / UNIT)
 
 
+def milliseconds(seconds: float) -> str:
+    """A time [s] in words: "2 ms"."""
+    return f"{1000 * seconds:g} ms"
+
+
 def time_between_ticks(period: int, step: int) -> int:
     """`period` rounded up to whole integration steps: a tick falls on the first step at or
     after its time."""

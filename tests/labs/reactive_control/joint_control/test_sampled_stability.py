@@ -10,11 +10,11 @@ from scipy.optimize import fsolve
 from labs.algorithms.integrators import INTEGRATORS
 from labs.algorithms.joint_control import CONTROL_LAWS, Gains
 from labs.models.plant import plant
-from labs.reactive_control.joint_control.divergence import (
+from labs.reactive_control.joint_control.divergence import explain
+from labs.reactive_control.joint_control.remedies import (
     MARGIN,
     AvailableSettings,
-    explain,
-    remedies,
+    find_remedies,
     robustly_stable,
 )
 from labs.reactive_control.joint_control.sampled_control import SampledLoop, simulate_sampled
@@ -153,7 +153,7 @@ def test_each_verdict_and_its_growth_hold_for_the_nonlinear_robot(fault: str) ->
 
 @pytest.mark.parametrize("fault", UNSTABLE)
 def test_what_is_proposed_works_on_the_nonlinear_robot(fault: str) -> None:
-    proposals = remedies([linear()], UNSTABLE[fault], AVAILABLE)
+    proposals = find_remedies([linear()], UNSTABLE[fault], AVAILABLE)
     assert len(proposals) == 2
     for setting in {setting for proposal in proposals for setting in proposal.settings}:
         if setting.controller == "pid" and setting.gains.ki == 0.0:
@@ -169,7 +169,7 @@ def test_a_proposed_step_is_tried_with_the_control_period_it_makes() -> None:
     setting = replace(UNSTABLE["integrator"], control_period=5e-3, step=5e-3)
     setting = replace(setting, gains=Gains(200.0, 0.0, 0.97))
     changes = [
-        s for proposal in remedies([linear()], setting, AVAILABLE) for s in proposal.settings
+        s for proposal in find_remedies([linear()], setting, AVAILABLE) for s in proposal.settings
     ]
     assert [change.step for change in changes] == [5e-3, 5e-4]
     assert all(change.control_period == 5e-3 for change in changes)
@@ -177,21 +177,21 @@ def test_a_proposed_step_is_tried_with_the_control_period_it_makes() -> None:
 
 def test_a_proposed_control_period_is_one_that_can_be_chosen() -> None:
     setting = replace(UNSTABLE["period"], step=2e-3)
-    proposal = remedies([linear()], setting, AVAILABLE)[0]
+    proposal = find_remedies([linear()], setting, AVAILABLE)[0]
     assert proposal.text == "a control period of 2 ms"
     assert [change.control_period for change in proposal.settings] == [0.002]
 
 
 def test_a_proposed_gain_is_no_more_cautious_than_its_margin() -> None:
     loop = linear()
-    less_integral = remedies([loop], UNSTABLE["gains"], AVAILABLE)[0].settings[-1]
+    less_integral = find_remedies([loop], UNSTABLE["gains"], AVAILABLE)[0].settings[-1]
     bolder = replace(
         less_integral, gains=replace(less_integral.gains, ki=1.05 * less_integral.gains.ki)
     )
     assert robustly_stable([loop], less_integral)
     assert not robustly_stable([loop], bolder)
     for fault in ("period", "integrator"):
-        damping = remedies([loop], UNSTABLE[fault], AVAILABLE)[-1]
+        damping = find_remedies([loop], UNSTABLE[fault], AVAILABLE)[-1]
         assert damping.text.startswith("k_d")
         ends = [setting.gains.kd for setting in damping.settings]
         for kd, factor in zip(ends, (0.9, 1.1), strict=True):
@@ -215,7 +215,7 @@ def test_a_stable_interval_is_named_by_both_ends() -> None:
     assert grows == {1.5: True, 8.0: False, 60.0: True}
     low, high = (
         s.gains.kd
-        for proposal in remedies([loop], setting, AVAILABLE)
+        for proposal in find_remedies([loop], setting, AVAILABLE)
         if proposal.text.startswith("k_d from")
         for s in proposal.settings
     )
@@ -229,7 +229,7 @@ def test_where_nothing_helps_nothing_is_proposed() -> None:
     """No law of these holds an upright arm by damping alone."""
     only_slow = AvailableSettings((0.05,), (0.01,), 0.02, 0.02)
     setting = replace(UNSTABLE["gains"], control_period=0.05, step=0.01)
-    assert remedies([linear()], setting, only_slow) == []
+    assert find_remedies([linear()], setting, only_slow) == []
     sentence = explain([linear()], setting, only_slow)
     assert sentence.endswith("No stable setting was found near this one.")
     assert "Try" not in sentence

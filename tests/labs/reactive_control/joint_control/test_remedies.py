@@ -9,7 +9,6 @@ import pytest
 
 from labs.algorithms.integrators import INTEGRATORS
 from labs.params import Value
-from labs.reactive_control.joint_control.divergence import remedies
 from labs.reactive_control.joint_control.lab import JointState
 from labs.reactive_control.joint_control.linearisation import loops_along_reference
 from labs.reactive_control.joint_control.params import (
@@ -18,6 +17,7 @@ from labs.reactive_control.joint_control.params import (
     REFERENCES,
     JointParams,
 )
+from labs.reactive_control.joint_control.remedies import find_remedies
 from labs.tasks.arm.postures import POSED_ARMS
 from tests.labs.reactive_control.joint_control.runs import final_state, parameters
 
@@ -62,7 +62,7 @@ def check_advice(seed: int, count: int, seconds: float) -> None:
     rng, advised = np.random.default_rng(seed), 0
     for _ in range(count):
         params, stopped = diverging(rng)
-        proposals = remedies(
+        proposals = find_remedies(
             loops_along_reference(params, stopped.q_ref), params.loop_settings, AVAILABLE_SETTINGS
         )
         advised += bool(proposals)

@@ -184,7 +184,7 @@ def test_without_a_policy_the_page_still_draws() -> None:
 
 def test_a_pendulum_pushed_past_a_full_turn_is_wound_back() -> None:
     """As the article says: a linear policy knows q, not q modulo 2 pi."""
-    params = with_({}, system="pendulum", deviation=0.0, limit=4.0, push_force=200.0)
+    params = LqrParams(system="pendulum", deviation=0.0, limit=4.0, push_force=200.0)
     state = LAB.init(params, np.random.default_rng(0))
     turned = []
     for k in range(800):

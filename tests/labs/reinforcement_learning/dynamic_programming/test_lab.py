@@ -12,7 +12,6 @@ from labs.engine.catalog import find
 from labs.engine.headless import run
 from labs.engine.run import World
 from labs.errors import LabError
-from labs.params import Value
 from labs.rounding import rounded_up
 from labs.scene import NullScene
 from labs.tasks.grid_world.map import MAPS, GridWorld

@@ -1,7 +1,7 @@
 """What is advised where a run diverged: followed, the run does not diverge."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 
 import numpy as np

@@ -12,6 +12,7 @@ from labs.engine.catalog import find
 from labs.engine.headless import run
 from labs.engine.run import World
 from labs.errors import LabError
+from labs.params import Value
 from labs.rounding import rounded_up
 from labs.scene import NullScene
 from labs.tasks.grid_world.map import MAPS, GridWorld
@@ -247,7 +248,13 @@ def test_every_method_draws_its_values_and_policy(world: str, shown: str) -> Non
 
 def test_a_torque_is_held_whatever_a_new_table_offers() -> None:
     """Until the next look-up, though the coarser table has fewer torques to choose from."""
-    setting = {"world": "pendulum", "gamma": 0.98, "levels": 11, "nodes": 31, "shown": "value"}
+    setting: dict[str, Value] = {
+        "world": "pendulum",
+        "gamma": 0.98,
+        "levels": 11,
+        "nodes": 31,
+        "shown": "value",
+    }
     world = solved(setting)
 
     def torque() -> float:

@@ -1,5 +1,11 @@
 """Numerics and labs. Nothing here knows the web."""
 
+import os
+
+# Before NumPy is loaded. On matrices of this size BLAS threads wait for each other, on a busy
+# machine for seconds; and one thread sums in the same order everywhere.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 try:
     import pinocchio  # noqa: F401
 except ImportError as error:

@@ -32,6 +32,28 @@ class Action:
 
 
 @dataclass(frozen=True)
+class Handle:
+    """What the user drags in the scene (`Scene.handle`) or clicks (`Scene.cells`), by the name it
+    is drawn under."""
+
+    name: str
+    help: str
+    count: int = 0
+    """Of several of a kind how many there may be, drawn as "NAME 1" to "NAME count"; 0: just
+    NAME."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All names it is drawn under."""
+        numbers = range(1, self.count + 1)
+        return tuple(f"{self.name} {k}" for k in numbers) or (self.name,)
+
+    def __str__(self) -> str:
+        """As a sentence lists it."""
+        return self.name if not self.count else f"{self.name} 1 to {self.name} {self.count}"
+
+
+@dataclass(frozen=True)
 class Inputs:
     """What the user does to the world besides turning parameters, as one step sees it."""
 
@@ -93,6 +115,8 @@ class Lab(abc.ABC, Generic[P, S]):
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {}
     """Named settings; a preset starts from the defaults."""
     actions: ClassVar[tuple[Action, ...]] = ()
+    handles: ClassVar[tuple[Handle, ...]] = ()
+    """All that `draw` may offer to be dragged or clicked."""
 
     @abc.abstractmethod
     def init(self, params: P, rng: np.random.Generator) -> S:
@@ -148,6 +172,15 @@ class Lab(abc.ABC, Generic[P, S]):
         if name not in names:
             raise ParameterError(
                 f"no action is named {name!r}; there are {', '.join(names) or 'none'}"
+            )
+
+    @classmethod
+    def check_handle(cls, name: str) -> None:
+        """Raises ParameterError unless a handle may have this name."""
+        if not any(name in handle.names for handle in cls.handles):
+            raise ParameterError(
+                f"no handle is named {name!r}; there are "
+                f"{', '.join(map(str, cls.handles)) or 'none'}"
             )
 
     @classmethod

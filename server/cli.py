@@ -192,7 +192,13 @@ def _run(options: argparse.Namespace) -> int:
         name: value if isinstance(value, float | int) else value.tolist()
         for name, value in world.lab.measure(world.params, world.state).items()
     }
-    final = {"lab": world.entry.slug, "seed": world.seed, "t": world.t, "trouble": world.trouble}
+    final = {
+        "lab": world.entry.slug,
+        "seed": world.seed,
+        "t": world.t,
+        "trouble": world.trouble,
+        "solver": (world.latest and world.latest.done) or None,
+    }
     print(json.dumps(final | measured))
     return 0
 

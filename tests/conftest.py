@@ -1,6 +1,8 @@
-"""What all tests share: the sample labs, and real servers in processes of their own.
+"""What all tests share: two lanes, the sample labs, and real servers in processes of their own.
 
-A server takes seconds to start: there is one for all tests that need the same settings."""
+The whole suite runs in two processes (`pytest-xdist`); a part of it, as `pytest PATH::TEST`, in the
+one that was started. A server takes seconds to start: there is one for all tests that need the same
+settings."""
 
 import os
 
@@ -10,7 +12,37 @@ from collections.abc import Iterator
 
 import pytest
 
+import labs  # noqa: F401  (before NumPy: it says how many threads BLAS gets)
 from tests.served import Served, until
+
+ORDER = ("browser", "labs/test_contract.py", "labs/test_live_sessions.py", "labs", "")
+"""What begins first. Browser tests are one piece and take longest; the other lane begins with labs
+that need nothing compiled, while a server of the first compiles the rest."""
+
+
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """Two lanes for the whole suite, and none for a part."""
+    return 2 if config.args_source is pytest.Config.ArgsSource.TESTPATHS else 0
+
+
+def pytest_xdist_setupnodes() -> None:
+    """Forgets what is compiled and stale, before there are two who would."""
+    import labs.compiled  # noqa: F401
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Into an order, and into groups that stay in one lane: all tests of the browser, of the
+    server, of one lab's contract, and else of one file."""
+    here = config.rootpath / "tests"
+    paths = {item: item.path.relative_to(here).as_posix() for item in items}
+    items.sort(key=lambda item: next(i for i, x in enumerate(ORDER) if paths[item].startswith(x)))
+    for item in items:
+        folder, _, _ = paths[item].partition("/")
+        callspec = getattr(item, "callspec", None)
+        entry = callspec.params.get("entry") if callspec else None
+        group = entry.slug if entry else paths[item] if folder == "labs" else folder
+        item.add_marker(pytest.mark.xdist_group(group))
 
 
 @pytest.fixture(scope="session")

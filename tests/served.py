@@ -15,7 +15,7 @@ import psutil
 from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
-PATIENCE = 60.0
+PATIENCE = 90.0
 """[s] What takes longer does not come any more, however busy the machine is."""
 
 

@@ -135,6 +135,13 @@ def test_trouble_is_a_result_and_a_sentence(orclab: Orclab) -> None:
     assert data["t"] == 0.01
 
 
+def test_the_solvers_last_sentence_is_printed_once_there_is_one(orclab: Orclab) -> None:
+    line = "run descent --set many=5 --seconds 0"
+    assert the_object(orclab(*line.split()))["solver"] == "5 steps done."
+    assert the_object(orclab(*line.split(), "--at", "0", "iterate=3"))["solver"] is None
+    assert the_object(orclab("run", "troublesome", "--seconds", "0"))["solver"] is None
+
+
 def test_a_diverged_arm_prints_finite_numbers_only(orclab: Orclab) -> None:
     line = "run joint-control --set kd=0 --set integrator=explicit-euler --set kp=2000"
     data = the_object(orclab(*line.split(), "--set", "torque_limits=off"))
@@ -227,6 +234,7 @@ def test_wrong_use_ends_the_process_with_2_and_no_traceback() -> None:
         ("run oscillator --at 1 press=jump", "there are kick"),
         ("run oscillator --at 1 hold=pull:1,2", "held at x,y,z or released"),
         ("run oscillator --at 1 hold=pull:nan,0,0", "three finite numbers"),
+        ("run oscillator --at 1 hold=plul:0,0,0", "no handle is named 'plul'; there are pull"),
         ("run oscillator --at 99 omega=1", "lies beyond the run's 10 s"),
         ("run oscillator --out run.txt", "F.json, F.csv or F.npz"),
         ("run oscillator --out no/such/folder/run.json", "there is no folder"),

@@ -144,6 +144,7 @@ class World:
 
     def hold(self, handle: str, point: Point | None) -> None:
         """A handle is held at a point [m], or released (None). Raises ParameterError."""
+        self.lab.check_handle(handle)
         if point is None:
             if self._handles.pop(handle, None) is None:
                 return

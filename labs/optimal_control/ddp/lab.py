@@ -9,7 +9,7 @@ import numpy as np
 
 from labs.algorithms import ddp
 from labs.algorithms.ddp import Iterate
-from labs.lab import Action, Inputs, Lab, Measurement, Snapshot, State
+from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.models.mechanisms import mechanism
 from labs.optimal_control.ddp.disturbances import apply_impulse, sample_noise
 from labs.optimal_control.ddp.history import History, thin_out
@@ -96,6 +96,7 @@ class Ddp(Lab[DdpParams, DdpState]):
     actions = (
         Action("push", "Push", "Strikes the tip of both robots, while the motion plays.", "World"),
     )
+    handles = (Handle("target", "The UR5's target."),)
 
     def init(self, params: DdpParams, rng: np.random.Generator) -> DdpState:
         """The first guess, rolled out, is the first plan; the start at rest, where it diverges."""

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from labs.lab import Action, Inputs, Lab, Measurement, Snapshot, State
+from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.models.plant import Force
 from labs.optimal_control.lqr.comparison import COMPARED_HORIZONS, HORIZON_COUNT, compare
 from labs.optimal_control.lqr.params import LqrParams
@@ -99,6 +99,7 @@ class Lqr(Lab[LqrParams, LqrState]):
         },
     }
     actions = (Action("push", "Push", "Pushes the tip along +y for 0.2 s.", group="World"),)
+    handles = (Handle("pull", "Pulls the tip towards where it is dragged."),)
 
     @classmethod
     def prepare(cls) -> None:

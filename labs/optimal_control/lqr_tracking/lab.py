@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from labs.algorithms.riccati import prepare
-from labs.lab import Action, Inputs, Lab, Measurement, State
+from labs.lab import Action, Handle, Inputs, Lab, Measurement, State
 from labs.models.discrete import Discrete
 from labs.models.mechanisms import Mechanism, mechanism
 from labs.optimal_control.lqr_tracking.laps import (
@@ -79,6 +79,7 @@ class LqrTracking(Lab[TrackingParams, TrackingState]):
     actions = (
         Action("push", "Push", "Pushes robot and ghost for 0.2 s; nobody knows before.", "World"),
     )
+    handles = (Handle("size", "Makes the path larger or smaller."),)
 
     @classmethod
     def prepare(cls) -> None:

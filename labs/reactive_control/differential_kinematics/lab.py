@@ -17,7 +17,7 @@ from labs.algorithms.inverse_kinematics import (
     slowed,
 )
 from labs.algorithms.jacobian import Chain, Kinematics, analytical, geometric, geometric_rate
-from labs.lab import Inputs, Lab, Measurement, State
+from labs.lab import Handle, Inputs, Lab, Measurement, State
 from labs.models.arms import Arm, load
 from labs.params import Group, Params, Value
 from labs.plots import Bars, Line, Matrix, Readout, TimeSeries
@@ -240,6 +240,7 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         "Stretched arm": {"q2": 0.7, "q3": -1.55},
         "Wrist of the UR5 aligned": {"task": "pose", "q5": 1.57},
     }
+    handles = (Handle("target", "The end-effector's target."),)
 
     def init(self, params: DifferentialParams, rng: np.random.Generator) -> DifferentialState:
         """As posed, the target at the frame."""

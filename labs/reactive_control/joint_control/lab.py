@@ -10,7 +10,7 @@ import numpy as np
 
 from labs.algorithms.integrators import INTEGRATORS
 from labs.algorithms.joint_control import LAWS, Gains, Law
-from labs.lab import Action, Inputs, Lab, Measurement, State
+from labs.lab import Action, Handle, Inputs, Lab, Measurement, State
 from labs.models.arms import load
 from labs.models.plant import Force, Plant, plant
 from labs.params import Group, Params, Value
@@ -245,6 +245,7 @@ class JointControl(Lab[JointParams, JointState]):
         "Double pendulum": {"robot": "double-pendulum", "amplitude": 0.6, "frequency": 0.5},
     }
     actions = (Action("push", "Push", "Pushes the end-effector for 0.2 s."),)
+    handles = (Handle("pull", "Pulls the end-effector towards where it is dragged."),)
 
     def init(self, params: JointParams, rng: np.random.Generator) -> JointState:
         """q(0) = q_ref(0) + initial error, v(0) = v_ref(0)."""

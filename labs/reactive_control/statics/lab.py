@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pinocchio as pin
 
-from labs.lab import Action, Inputs, Lab, Measurement, State
+from labs.lab import Action, Handle, Inputs, Lab, Measurement, State
 from labs.models.arms import load
 from labs.models.plant import plant
 from labs.models.postures import POSTURES, ROBOTS, posture
@@ -230,6 +230,7 @@ class Statics(Lab[StaticsParams, StaticsState]):
             group="Wrench at the end-effector",
         ),
     )
+    handles = (Handle("pull", "The force at the end-effector."),)
 
     def init(self, params: StaticsParams, rng: np.random.Generator) -> StaticsState:
         """Nothing dragged yet."""

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from labs.lab import Action, Inputs, Lab, Measurement, Snapshot, State
+from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
 from labs.reinforcement_learning.dynamic_programming.follower import (
     PERIOD,
@@ -97,6 +97,7 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         Action("again", "Start again", "Back to the start: S, or hanging at rest."),
         Action("push", "Push", "The pendulum gets 4 rad/s; the walker lands in some other cell."),
     )
+    handles = (Handle("board", "A click puts the brush's cell on the map."),)
 
     @classmethod
     def prepare(cls) -> None:

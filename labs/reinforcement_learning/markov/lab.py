@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from labs.algorithms.markov_chain import iterate_values
-from labs.lab import Inputs, Lab, Measurement, Snapshot, State
+from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
 from labs.reinforcement_learning.markov.chains import parse_rows, write_rows
 from labs.reinforcement_learning.markov.description import about_chain, about_value
@@ -58,6 +58,15 @@ class Markov(Lab[MarkovParams, MarkovState]):
         "A gambler's ruin": {"chain": "gambler", "gamma": 1.0},
         "A machine, mended half the time": {"chain": "machine", "first": 0.5},
     }
+    handles = (
+        Handle("token", "Sets the walker down on the nearest state."),
+        Handle(
+            "tile",
+            "A click chooses this state as the one its transitions lead out of.",
+            len(NUMBERS),
+        ),
+        Handle("bead", "The probability of the transition to this state.", len(NUMBERS)),
+    )
 
     def init(self, params: MarkovParams, rng: np.random.Generator) -> MarkovState:
         P, none = params.process.P, np.zeros(0)

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from labs.lab import Inputs, Lab, Measurement, Snapshot, State
+from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
 from labs.random_numbers import seeded
 from labs.reinforcement_learning.td_control.greedy_walk import (
@@ -82,6 +82,7 @@ class TdControl(Lab[TdParams, TdState]):
             "alpha": 1.0,
         },
     }
+    handles = (Handle("board", "A click puts the brush's cell on the map."),)
 
     def init(self, params: TdParams, rng: np.random.Generator) -> TdState:
         task, many = params.task, len(params.methods)

@@ -126,6 +126,25 @@ def test_a_handle_pulls_until_it_is_released() -> None:
     assert [*pulled, advanced(world, 1).state.pulled] == [0.5, 0.5, 0.5, 0.0]
 
 
+def test_a_handle_that_is_not_declared_is_refused() -> None:
+    """A drag that names none would be lost without a word."""
+    world = a_world()
+    for point in ((0.4, 0.2, 0.7), None):
+        with pytest.raises(ParameterError, match="no handle is named 'plul'; there are pull"):
+            world.hold("plul", point)
+    with pytest.raises(ParameterError, match="there are none"):
+        World(find("troublesome")).hold("pull", (0.0, 0.0, 0.0))
+    with pytest.raises(ParameterError, match=r"token, tile 1 to tile 12, bead 1 to bead 12$"):
+        World(find("markov")).hold("bead 13", (0.0, 0.0, 0.0))
+    assert [e for e in world.events if e.kind == "hold"] == []
+
+
+def test_what_is_not_held_can_be_released() -> None:
+    world = a_world()
+    world.hold("pull", None)
+    assert [e for e in world.events if e.kind == "hold"] == []
+
+
 @pytest.mark.parametrize("point", [(math.nan, 0.0, 0.0), (0.0, math.inf, 0.0), (0.0, 0.0)])
 def test_a_handle_goes_to_finite_points_only(point: Any) -> None:
     world = a_world()

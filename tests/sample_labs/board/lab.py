@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import field_validator
 
 from labs.colors import sequential
-from labs.lab import Inputs, Lab, Measurement, State
+from labs.lab import Handle, Inputs, Lab, Measurement, State
 from labs.params import LONGEST_TEXT, Group, Params, Value
 from labs.plots import Line, TimeSeries
 from labs.scene import Scene, cell_at, cell_centers
@@ -54,6 +54,7 @@ class Board(Lab[BoardParams, BoardState]):
     summary = "A board to click, and a wave over it."
     Params = BoardParams
     plots = (TimeSeries("Walls", "", Line("walls", "n"), Line("held", "h")),)
+    handles = (Handle("board", "A click makes a wall, or takes it away."),)
 
     def init(self, params: BoardParams, rng: np.random.Generator) -> BoardState:
         return BoardState()

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from labs.lab import Action, Inputs, Lab, Measurement, Snapshot, State
+from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Group, Params, Value
 from labs.plots import Bars, Curves, HeatMap, Line, Matrix, Note, Readout, TimeSeries, Trace
 from labs.scene import Scene
@@ -64,6 +64,7 @@ class Oscillator(Lab[OscillatorParams, OscillatorState]):
     )
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {"Fast": {"omega": 8.0}}
     actions = (Action("kick", "Kick", "Kicks it."),)
+    handles = (Handle("pull", "Pulls the ball."),)
 
     def init(self, params: OscillatorParams, rng: np.random.Generator) -> OscillatorState:
         return OscillatorState(x=params.start, key=int(rng.integers(2**32)))

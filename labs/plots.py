@@ -47,9 +47,9 @@ class Trace:
     """One line or set of points among `Curves`: y over x, 1-D fields of one length, which may
     change and be 0. With y of shape (n, k) it is k curves, each of a colour of its own, over the
     same x or each over its column of an x of that shape. "marked" is a line with its points.
-    Without a label it stays out of the legend; `note` names a field of one number (or none) for
-    each curve, that stands behind the label. `series` is its colour, or that of the first curve,
-    1 to 8, or 0 for ink."""
+    Without a label it stays out of the legend; `note` names a field of one number for each curve
+    (NaN or none where there is none), that stands behind the label. `series` is its colour, or
+    that of the first curve, 1 to 8, or 0 for ink."""
 
     x: str
     y: str
@@ -182,6 +182,8 @@ def pictured(plot: Plot) -> tuple[str, ...]:
 def may_have_gaps(plot: Plot) -> tuple[str, ...]:
     """The fields a plot shows in which NaN stands for what has no value."""
     match plot:
+        case Curves(traces=traces):
+            return tuple(trace.note for trace in traces if trace.note)
         case HeatMap(z=z, gaps=True):
             return (z,)
         case Bars(field=field, marks=marks, gaps=True):

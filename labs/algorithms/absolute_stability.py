@@ -67,14 +67,14 @@ def reversed_characteristic(m: np.ndarray) -> np.ndarray:
     return _without_rounding(coefficients, largest)
 
 
-def largest_step(r: StabilityFunction, eigenvalues: np.ndarray) -> float:
+def largest_stable_step(r: StabilityFunction, eigenvalues: np.ndarray) -> float:
     """The largest h [s] up to which |R(h lambda)| <= 1 for all eigenvalues (m,) [1/s], from the
     zeros of |P|^2 - |Q|^2 on the ray through lambda; infinite when there is no limit, 0 when
     every step is too long, however little it adds."""
     return min((_along(r, value) for value in eigenvalues if abs(value) > 0.0), default=np.inf)
 
 
-def boundary(r: StabilityFunction, reach: float, points: int = 240) -> np.ndarray:
+def stability_boundary(r: StabilityFunction, reach: float, points: int = 240) -> np.ndarray:
     """Complex points in order along the edge |R(z)| = 1 that passes through z = 0, as far as
     |z| <= reach: the roots of P - e^(i theta) Q followed from theta = 0 until they return."""
     degree = max(len(r.p), len(r.q)) - 1
@@ -94,7 +94,9 @@ def boundary(r: StabilityFunction, reach: float, points: int = 240) -> np.ndarra
     return np.array(edge)
 
 
-def measured_limit(growth: Callable[[float], float], lowest: float, highest: float) -> float:
+def measured_stability_limit(
+    growth: Callable[[float], float], lowest: float, highest: float
+) -> float:
     """The h at which a method starts to blow up: h is raised from `lowest` by a fifth at a time
     until growth(h), the factor of one step, passes 1, then halved in between. Infinite when it
     does not up to `highest`, 0 when it does from the start."""

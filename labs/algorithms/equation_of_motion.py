@@ -16,7 +16,7 @@ import pinocchio as pin
 
 
 @dataclass(frozen=True, eq=False)
-class Terms:
+class EquationTerms:
     """The terms at one state (q, v)."""
 
     mass: np.ndarray
@@ -32,16 +32,22 @@ class Terms:
         return h
 
 
-def terms(model: pin.Model, data: pin.Data, q: np.ndarray, v: np.ndarray) -> Terms:
+def equation_terms(model: pin.Model, data: pin.Data, q: np.ndarray, v: np.ndarray) -> EquationTerms:
     """M(q), C(q, v) and g(q) at q (nq,) [rad] and v (nv,) [rad/s]."""
-    upper = np.triu(pin.crba(model, data, q))
-    mass = upper + np.triu(upper, 1).T
+    mass = mass_matrix(model, data, q)
     coriolis = pin.computeCoriolisMatrix(model, data, q, v).copy()
     gravity = pin.computeGeneralizedGravity(model, data, q).copy()
-    return Terms(mass, coriolis, gravity)
+    return EquationTerms(mass, coriolis, gravity)
 
 
-def direct(
+def mass_matrix(model: pin.Model, data: pin.Data, q: np.ndarray) -> np.ndarray:
+    """M(q), (nv, nv), both triangles [kg m^2], at q (nq,) [rad]."""
+    upper = np.triu(pin.crba(model, data, q))
+    mass: np.ndarray = upper + np.triu(upper, 1).T
+    return mass
+
+
+def direct_dynamics(
     model: pin.Model, data: pin.Data, q: np.ndarray, v: np.ndarray, applied: np.ndarray
 ) -> np.ndarray:
     """q'' (nv,) [rad/s^2] with M q'' + h = applied, where applied = tau + J^T w (nv,) [N m]."""
@@ -49,7 +55,7 @@ def direct(
     return acceleration
 
 
-def inverse(
+def inverse_dynamics(
     model: pin.Model, data: pin.Data, q: np.ndarray, v: np.ndarray, a: np.ndarray
 ) -> np.ndarray:
     """tau + J^T w = M a + h (nv,) [N m] that gives the acceleration a (nv,) [rad/s^2]."""

@@ -26,21 +26,21 @@ class FrameChain:
         poses[-1] = poses[-1] @ self._tip
         return poses
 
-    def dependence(self, q: np.ndarray) -> np.ndarray:
+    def derivative_norms(self, q: np.ndarray) -> np.ndarray:
         """(n + 1, n): the Frobenius norm of the derivative of each factor (a row) and of their
         product (the last row) by each joint (a column), from central differences. It adds up
         metres and pure numbers: what counts is which entries are zero."""
         step = 1e-6
-        found = np.empty((len(q) + 1, len(q)))
+        norms = np.empty((len(q) + 1, len(q)))
         for j, change in enumerate(step * np.eye(len(q))):
             ahead, behind = self.factors(q + change), self.factors(q - change)
-            ahead.append(product(ahead))
-            behind.append(product(behind))
-            found[:, j] = np.linalg.norm(np.subtract(ahead, behind), axis=(1, 2)) / (2.0 * step)
-        return found
+            ahead.append(multiply_poses(ahead))
+            behind.append(multiply_poses(behind))
+            norms[:, j] = np.linalg.norm(np.subtract(ahead, behind), axis=(1, 2)) / (2.0 * step)
+        return norms
 
 
-def product(factors: list[np.ndarray]) -> np.ndarray:
+def multiply_poses(factors: list[np.ndarray]) -> np.ndarray:
     """The poses (4, 4) multiplied, the first leftmost."""
     pose = np.eye(4)
     for factor in factors:

@@ -28,7 +28,9 @@ Acceleration = Callable[[np.ndarray, np.ndarray], np.ndarray]
 Duration = float | np.ndarray
 """h [s]: a number, or that number nv times in an array, which NumPy multiplies faster."""
 
-Step = Callable[[Acceleration, np.ndarray, np.ndarray, Duration], tuple[np.ndarray, np.ndarray]]
+IntegratorStep = Callable[
+    [Acceleration, np.ndarray, np.ndarray, Duration], tuple[np.ndarray, np.ndarray]
+]
 """(a, q, v, h) to (q+, v+), as new arrays."""
 
 
@@ -78,7 +80,7 @@ class Integrator:
 
     title: str
     order: int
-    step: Step
+    step: IntegratorStep
 
 
 INTEGRATORS: Mapping[str, Integrator] = {

@@ -13,15 +13,20 @@ The third minimises |J q' - v|^2 + lambda^2 |q'|^2; since sigma / (sigma^2 + lam
 1 / (2 lambda), so is |q'| / |v|. (Nakamura and Hanafusa 1986; Wampler 1986.)
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import pinocchio as pin
+from scipy.optimize import least_squares
 
-NEGLIGIBLE = 1e-12
+from labs.algorithms.jacobian import ForwardKinematics, geometric_jacobian
+
+REACHED = 1e-3
+"""[m] A place is within reach if the frame comes as near as this."""
+RELATIVE_CUTOFF = 1e-12
 """Singular values below this share of the largest count as zero in the pseudo-inverse."""
 
-METHODS: Mapping[str, str] = {
+INVERSE_KINEMATICS_METHODS: Mapping[str, str] = {
     "pseudo-inverse": "Pseudo-inverse",
     "transpose": "Transpose",
     "damped": "Damped",
@@ -31,18 +36,18 @@ METHODS: Mapping[str, str] = {
 def pseudo_inverse(jacobian: np.ndarray, v: np.ndarray) -> np.ndarray:
     """q' (n,) = J^+ v: of all q' that come closest to J q' = v the shortest. J (m, n), v (m,)."""
     u, sigma, rt = np.linalg.svd(jacobian, full_matrices=False)
-    kept = sigma > NEGLIGIBLE * sigma[0]
+    kept = sigma > RELATIVE_CUTOFF * sigma[0]
     rates: np.ndarray = rt[kept].T @ ((u.T @ v)[kept] / sigma[kept])
     return rates
 
 
-def transpose(jacobian: np.ndarray, v: np.ndarray) -> np.ndarray:
+def jacobian_transpose(jacobian: np.ndarray, v: np.ndarray) -> np.ndarray:
     """q' (n,) = J^T v: downhill for |e|^2 / 2 where v is proportional to the error e."""
     rates: np.ndarray = jacobian.T @ v
     return rates
 
 
-def damped(jacobian: np.ndarray, v: np.ndarray, damping: float) -> np.ndarray:
+def damped_least_squares(jacobian: np.ndarray, v: np.ndarray, damping: float) -> np.ndarray:
     """q' (n,) = J^T (J J^T + lambda^2 I)^-1 v, lambda = `damping` > 0 in the units of J."""
     m = len(v)
     rates: np.ndarray = jacobian.T @ np.linalg.solve(
@@ -57,9 +62,9 @@ def joint_rates(method: str, jacobian: np.ndarray, v: np.ndarray, damping: float
         case "pseudo-inverse":
             return pseudo_inverse(jacobian, v)
         case "transpose":
-            return transpose(jacobian, v)
+            return jacobian_transpose(jacobian, v)
         case _:
-            return damped(jacobian, v, damping)
+            return damped_least_squares(jacobian, v, damping)
 
 
 def pose_error(placement: pin.SE3, target: pin.SE3) -> np.ndarray:
@@ -69,13 +74,13 @@ def pose_error(placement: pin.SE3, target: pin.SE3) -> np.ndarray:
     return np.concatenate([target.translation - placement.translation, turn])
 
 
-def shortened(vector: np.ndarray, longest: float) -> np.ndarray:
+def clip_norm(vector: np.ndarray, longest: float) -> np.ndarray:
     """`vector`, scaled down where its length exceeds `longest`."""
     length = float(np.linalg.norm(vector))
     return vector if length <= longest else vector * (longest / length)
 
 
-def slowed(rates: np.ndarray, fastest: float) -> np.ndarray:
+def scale_to_speed_limit(rates: np.ndarray, fastest: float) -> np.ndarray:
     """q' (n,), all of it scaled down by one factor where a joint exceeds `fastest`: the
     direction of the motion stays."""
     peak = float(np.abs(rates).max())
@@ -87,3 +92,29 @@ def manipulability(jacobian: np.ndarray) -> tuple[np.ndarray, float]:
     product: sqrt(det(J J^T)) for m <= n (Yoshikawa 1985)."""
     sigma = np.linalg.svd(jacobian, compute_uv=False)
     return sigma, float(np.prod(sigma))
+
+
+def nearest_distance(
+    kinematics: ForwardKinematics,
+    target: np.ndarray,
+    starts: Iterable[np.ndarray],
+    lower: np.ndarray,
+    upper: np.ndarray,
+) -> float:
+    """The least |p_e(q) - p*| [m] to a place p* (3,) over lower <= q <= upper (n,), by
+    Gauss-Newton steps in a trust region (scipy.optimize.least_squares) from each start (n,) until
+    one is within REACHED. Such minima are local: what is found is at least the least distance."""
+    least = np.inf
+    for start in starts:
+        found = least_squares(
+            lambda q: kinematics.at(q).placement.translation - target,
+            np.clip(start, lower + 1e-6, upper - 1e-6),
+            lambda q: geometric_jacobian(kinematics.at(q))[:3],
+            (lower, upper),
+            ftol=1e-6,
+            xtol=1e-6,
+        )
+        least = min(least, float(np.linalg.norm(found.fun)))
+        if least <= REACHED:
+            break
+    return least

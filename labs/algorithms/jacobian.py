@@ -22,12 +22,12 @@ import pinocchio as pin
 
 from labs.algorithms.orientation import matrix_to_rpy
 
-SMALLEST_COS = 1e-6
+SMALLEST_COSINE = 1e-6
 """T is not inverted nearer to its singularity than this cos(theta)."""
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class PosedChain:
     """The joints of an arm at one posture, and the frame they move; the world's axes."""
 
     axes: np.ndarray
@@ -36,13 +36,13 @@ class Chain:
     """(n, 3) [m] the origins p_i of the joints."""
     prismatic: np.ndarray
     """(n,) whether joint i slides."""
-    carries: np.ndarray
+    supports: np.ndarray
     """(n,) whether joint i lies between the base and the frame."""
     placement: pin.SE3
     """Of the frame: R_e and p_e [m]."""
 
 
-class Kinematics:
+class ForwardKinematics:
     """Forward kinematics of an arm of one-degree-of-freedom joints, up to one frame."""
 
     def __init__(self, model: pin.Model, frame: int) -> None:
@@ -56,68 +56,68 @@ class Kinematics:
         assert subspaces.shape == (n, 6)
         self._prismatic: np.ndarray = ~np.any(subspaces[:, 3:], axis=1)
         self._axes = np.where(self._prismatic[:, None], subspaces[:, :3], subspaces[:, 3:])
-        supports = set(model.supports[model.frames[frame].parentJoint])
-        self._carries = np.array([j in supports for j in range(1, model.njoints)])
+        between = set(model.supports[model.frames[frame].parentJoint])
+        self._supports = np.array([j in between for j in range(1, model.njoints)])
 
-    def at(self, q: np.ndarray) -> Chain:
+    def at(self, q: np.ndarray) -> PosedChain:
         """The chain at q (n,) [rad; m where prismatic]."""
         pin.forwardKinematics(self.model, self._data, q)
         placement = pin.updateFramePlacement(self.model, self._data, self.frame).copy()
         joints = self._data.oMi[1:]
-        return Chain(
+        return PosedChain(
             axes=np.array([m.rotation @ z for m, z in zip(joints, self._axes, strict=True)]),
             points=np.array([m.translation for m in joints]),
             prismatic=self._prismatic,
-            carries=self._carries,
+            supports=self._supports,
             placement=placement,
         )
 
 
-def geometric(chain: Chain) -> np.ndarray:
+def geometric_jacobian(chain: PosedChain) -> np.ndarray:
     """J (6, n): linear above angular rows, [m/rad, 1; prismatic: 1, 0]."""
-    turning = (~chain.prismatic & chain.carries)[:, None]
-    sliding = (chain.prismatic & chain.carries)[:, None]
+    turning = (~chain.prismatic & chain.supports)[:, None]
+    sliding = (chain.prismatic & chain.supports)[:, None]
     levers = chain.placement.translation - chain.points
     linear = turning * _cross(chain.axes, levers) + sliding * chain.axes
     return np.concatenate([linear, turning * chain.axes], axis=1).T
 
 
-def geometric_rate(chain: Chain, v: np.ndarray) -> np.ndarray:
+def geometric_jacobian_rate(chain: PosedChain, v: np.ndarray) -> np.ndarray:
     """J' (6, n) [1/s times J's units] while the joints move at v (n,) [rad/s; m/s].
 
     An axis is carried around by the joints before it: z_i' = omega_i x z_i, and
     (z_i x (p_e - p_i))' = z_i' x (p_e - p_i) + z_i x (p_e' - p_i')."""
     n = len(v)
     levers = chain.placement.translation - chain.points
-    turning = (~chain.prismatic & chain.carries)[:, None]
-    sliding = (chain.prismatic & chain.carries)[:, None]
+    turning = (~chain.prismatic & chain.supports)[:, None]
+    sliding = (chain.prismatic & chain.supports)[:, None]
     spins = turning * chain.axes * v[:, None]
     omega = np.cumsum(spins, axis=0)
     # p_i' by the joints up to i: those that turn, about their own points, and those that slide.
     slides = np.cumsum(sliding * chain.axes * v[:, None], axis=0)
     moments = np.cumsum(_cross(spins, chain.points), axis=0)
     points = _cross(omega, chain.points) - moments + slides
-    tip = geometric(chain)[:3] @ v
+    tip = geometric_jacobian(chain)[:3] @ v
     axes = _cross(omega, chain.axes)
     swing = _cross(axes, levers) + _cross(chain.axes, np.broadcast_to(tip, (n, 3)) - points)
     return np.concatenate([turning * swing + sliding * axes, turning * axes], axis=1).T
 
 
-def inverse_rate_matrix(angles: np.ndarray) -> np.ndarray:
+def inverse_rpy_rate_matrix(angles: np.ndarray) -> np.ndarray:
     """T^-1 (3, 3): phi_o' = T^-1 omega. It grows as 1 / cos(theta); within SMALLEST_COS of
     theta = +-pi/2, where T has no inverse, it stays at its value there and finite."""
     _, theta, psi = angles
     c, s = np.cos(psi), np.sin(psi)
     cos = float(np.cos(theta))
-    cos = float(np.copysign(max(abs(cos), SMALLEST_COS), cos))
+    cos = float(np.copysign(max(abs(cos), SMALLEST_COSINE), cos))
     sin = np.sin(theta)
     return np.array([[c / cos, s / cos, 0.0], [-s, c, 0.0], [c * sin / cos, s * sin / cos, 1.0]])
 
 
-def analytical(chain: Chain, jacobian: np.ndarray) -> np.ndarray:
+def analytical_jacobian(chain: PosedChain, jacobian: np.ndarray) -> np.ndarray:
     """J_A (6, n) from the geometric J (6, n): the same linear rows, T^-1 J_o below."""
     angles = matrix_to_rpy(chain.placement.rotation)
-    return np.concatenate([jacobian[:3], inverse_rate_matrix(angles) @ jacobian[3:]])
+    return np.concatenate([jacobian[:3], inverse_rpy_rate_matrix(angles) @ jacobian[3:]])
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

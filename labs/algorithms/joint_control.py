@@ -21,7 +21,11 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-Law = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+from labs.algorithms.equation_of_motion import mass_matrix
+
+ControlLaw = Callable[
+    [np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray
+]
 
 
 @dataclass(frozen=True)
@@ -33,38 +37,38 @@ class Gains:
     kd: float
 
 
-def open_loop(model: pin.Model, data: pin.Data, gains: Gains) -> Law:
+def open_loop(model: pin.Model, data: pin.Data, gains: Gains) -> ControlLaw:
     """tau = M(q_ref) a_ref + h(q_ref, v_ref): the inverse dynamics of the reference, whatever
     the robot does."""
     inverse_dynamics = pin.rnea
     return lambda q, v, z, q_ref, v_ref, a_ref: inverse_dynamics(model, data, q_ref, v_ref, a_ref)
 
 
-def pid(model: pin.Model, data: pin.Data, gains: Gains) -> Law:
+def pid(model: pin.Model, data: pin.Data, gains: Gains) -> ControlLaw:
     """tau = k_p e + k_d e' + k_i z: no model at all."""
-    kp, ki, kd = _each(model, gains)
+    kp, ki, kd = _gain_vectors(model, gains)
     return lambda q, v, z, q_ref, v_ref, a_ref: kp * (q_ref - q) + kd * (v_ref - v) + ki * z
 
 
-def pd_gravity(model: pin.Model, data: pin.Data, gains: Gains) -> Law:
+def pd_gravity(model: pin.Model, data: pin.Data, gains: Gains) -> ControlLaw:
     """tau = k_p e + k_d e' + g(q): of the model, its gravity only."""
-    kp, _, kd = _each(model, gains)
+    kp, _, kd = _gain_vectors(model, gains)
     gravity = pin.computeGeneralizedGravity
     return lambda q, v, z, q_ref, v_ref, a_ref: (
         kp * (q_ref - q) + kd * (v_ref - v) + gravity(model, data, q)
     )
 
 
-def computed_torque(model: pin.Model, data: pin.Data, gains: Gains) -> Law:
+def computed_torque(model: pin.Model, data: pin.Data, gains: Gains) -> ControlLaw:
     """tau = M(q) (a_ref + k_p e + k_d e') + h(q, v): all of the model, at the measured state."""
-    kp, _, kd = _each(model, gains)
+    kp, _, kd = _gain_vectors(model, gains)
     inverse_dynamics = pin.rnea
     return lambda q, v, z, q_ref, v_ref, a_ref: inverse_dynamics(
         model, data, q, v, a_ref + kp * (q_ref - q) + kd * (v_ref - v)
     )
 
 
-LAWS: Mapping[str, Callable[[pin.Model, pin.Data, Gains], Law]] = {
+CONTROL_LAWS: Mapping[str, Callable[[pin.Model, pin.Data, Gains], ControlLaw]] = {
     "open-loop": open_loop,
     "pid": pid,
     "pd-gravity": pd_gravity,
@@ -73,7 +77,7 @@ LAWS: Mapping[str, Callable[[pin.Model, pin.Data, Gains], Law]] = {
 
 
 @dataclass(frozen=True)
-class Feedback:
+class LinearFeedback:
     """A law near a resting reference: d tau = -k_q dq - k_v dv + k_z dz, each (nv, nv)."""
 
     k_q: np.ndarray
@@ -81,31 +85,24 @@ class Feedback:
     k_z: np.ndarray
 
 
-def linearised(
+def linearise_law(
     name: str, model: pin.Model, data: pin.Data, gains: Gains, q: np.ndarray
-) -> Feedback:
+) -> LinearFeedback:
     """The law's derivatives at q = q_ref (nq,), v = v_ref = a_ref = 0, z = 0. There the
     derivative of g is dg/dq, and of M(q) a + h(q, v) it is M(q) da + (dg/dq) dq."""
     eye, zero = np.eye(model.nv), np.zeros((model.nv, model.nv))
     if name == "open-loop":
-        return Feedback(zero, zero, zero)
+        return LinearFeedback(zero, zero, zero)
     if name == "pid":
-        return Feedback(gains.kp * eye, gains.kd * eye, gains.ki * eye)
+        return LinearFeedback(gains.kp * eye, gains.kd * eye, gains.ki * eye)
     gravity = pin.computeGeneralizedGravityDerivatives(model, data, q)
     if name == "pd-gravity":
-        return Feedback(gains.kp * eye - gravity, gains.kd * eye, zero)
+        return LinearFeedback(gains.kp * eye - gravity, gains.kd * eye, zero)
     mass = mass_matrix(model, data, q)
-    return Feedback(gains.kp * mass - gravity, gains.kd * mass, zero)
+    return LinearFeedback(gains.kp * mass - gravity, gains.kd * mass, zero)
 
 
-def mass_matrix(model: pin.Model, data: pin.Data, q: np.ndarray) -> np.ndarray:
-    """M(q), (nv, nv), both triangles [kg m^2]."""
-    upper = np.triu(pin.crba(model, data, q))
-    mass: np.ndarray = upper + np.triu(upper, 1).T
-    return mass
-
-
-def _each(model: pin.Model, gains: Gains) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _gain_vectors(model: pin.Model, gains: Gains) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The gains as arrays (nv,): NumPy multiplies two small arrays faster than an array by a
     number."""
     return (

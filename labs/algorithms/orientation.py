@@ -12,7 +12,7 @@ import numpy as np
 
 SEQUENCES = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx", "xyx", "xzx", "yxy", "yzy", "zxz", "zyz")
 """Three different axes (Cardan angles), then those whose third axis is the first again."""
-LOCKED = 1e-12
+LOCK_TOLERANCE = 1e-12
 """Sine of the angle between first and third axis below which they count as one: psi is then 0."""
 
 
@@ -22,7 +22,7 @@ def skew(v: np.ndarray) -> np.ndarray:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
-def about(axis: str, angle: float) -> np.ndarray:
+def elementary_rotation(axis: str, angle: float) -> np.ndarray:
     """R_x, R_y or R_z of an angle [rad]: (3, 3)."""
     i = "xyz".index(axis)
     j, k = (i + 1) % 3, (i + 2) % 3
@@ -38,7 +38,7 @@ def about(axis: str, angle: float) -> np.ndarray:
 
 def euler_to_matrix(sequence: str, angles: np.ndarray) -> np.ndarray:
     """R = R_a(phi) R_b(theta) R_c(psi) (3, 3) of angles (3,) [rad]."""
-    first, second, third = map(about, sequence, angles)
+    first, second, third = map(elementary_rotation, sequence, angles)
     rotation: np.ndarray = first @ second @ third
     return rotation
 
@@ -55,7 +55,7 @@ def matrix_to_euler(sequence: str, rotation: np.ndarray) -> np.ndarray:
     theta lies in [-pi/2, pi/2] with three axes and in [0, pi] with two. psi is what is left in
     R_a(phi)^T R, which stays exact near the lock. Locked (first and third axis parallel), only
     phi + psi or phi - psi is determined: psi is 0 then."""
-    i, j, k, s = _order(sequence)
+    i, j, k, s = _axis_order(sequence)
     r = rotation
     if sequence[2] != sequence[0]:
         free = np.hypot(r[i, i], r[i, j])
@@ -65,9 +65,11 @@ def matrix_to_euler(sequence: str, rotation: np.ndarray) -> np.ndarray:
         free = np.hypot(r[i, j], r[i, k])
         theta = np.arctan2(free, r[i, i])
         phi = np.arctan2(r[j, i], -s * r[k, i])
-    if free < LOCKED:
+    if free < LOCK_TOLERANCE:
         return np.array([np.arctan2(s * r[k, j], r[j, j]), theta, 0.0])
-    row = about(sequence[0], phi).T[j] @ r  # of R_b(theta) R_c(psi), where R_b leaves row j alone
+    row = (
+        elementary_rotation(sequence[0], phi).T[j] @ r
+    )  # of R_b(theta) R_c(psi), where R_b leaves row j alone
     psi = np.arctan2(s * row[i] if sequence[2] != sequence[0] else -s * row[k], row[j])
     return np.array([phi, theta, psi])
 
@@ -90,8 +92,8 @@ def euler_axes(sequence: str, angles: np.ndarray) -> np.ndarray:
     omega (3,) [rad/s] is the angular velocity in the world's axes. det E = +-cos(theta), with two
     axes +-sin(theta): zero at the lock, where the three axes lie in a plane."""
     a, b, c = ("xyz".index(axis) for axis in sequence)
-    first = about(sequence[0], angles[0])
-    second = first @ about(sequence[1], angles[1])
+    first = elementary_rotation(sequence[0], angles[0])
+    second = first @ elementary_rotation(sequence[1], angles[1])
     return np.column_stack([np.eye(3)[a], first[:, b], second[:, c]])
 
 
@@ -113,7 +115,7 @@ def lost_direction(sequence: str, phi: float) -> np.ndarray:
     """(3,) the direction e_a x R_a(phi) e_b: at the lock no combination of the three angles' rates
     is a rotation about it."""
     a, b = ("xyz".index(axis) for axis in sequence[:2])
-    return np.cross(np.eye(3)[a], about(sequence[0], phi)[:, b])
+    return np.cross(np.eye(3)[a], elementary_rotation(sequence[0], phi)[:, b])
 
 
 # Four numbers ---------------------------------------------------------------------------------
@@ -169,7 +171,7 @@ def quaternion_rate(quaternion: np.ndarray, omega: np.ndarray) -> np.ndarray:
     return 0.5 * np.concatenate([[-v @ omega], w * omega + np.cross(omega, v)])
 
 
-def _order(sequence: str) -> tuple[int, int, int, int]:
+def _axis_order(sequence: str) -> tuple[int, int, int, int]:
     """First axis, second, the remaining one, and whether they are in cyclic order (1 or -1)."""
     i, j = "xyz".index(sequence[0]), "xyz".index(sequence[1])
     return i, j, 3 - i - j, 1 if (i + 1) % 3 == j else -1

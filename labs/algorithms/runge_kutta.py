@@ -29,18 +29,18 @@ import numpy as np
 from labs.errors import LabError
 
 MOST_STAGES = 6
-LARGEST = 100.0
+LARGEST_COEFFICIENT = 100.0
 """Of the numbers in a tableau that is typed in."""
 NEWTON_STEPS = 25
-TOLERANCE = 1e-12
+NEWTON_TOLERANCE = 1e-12
 """Newton stops when no component of the stage equations is off by more than this, relative to
 1 + the largest |f|."""
-EXACT = 1e-10
+ORDER_TOLERANCE = 1e-10
 """A condition of order counts as met within this: room for fractions typed with 12 digits."""
 
 
 @dataclass(frozen=True)
-class Flow:
+class VectorField:
     """x' = f(x, t): f takes (n,) and a time to (n,), its jacobian df/dx to (n, n)."""
 
     f: Callable[[np.ndarray, float], np.ndarray]
@@ -66,7 +66,7 @@ class Tableau:
 
 
 @dataclass(frozen=True)
-class Step:
+class RungeKuttaStep:
     """One step done."""
 
     x: np.ndarray
@@ -81,19 +81,21 @@ class Step:
     """Why it stopped, in a sentence; empty when all is well."""
 
 
-def step(tableau: Tableau, flow: Flow, x: np.ndarray, t: float, h: float) -> Step:
+def runge_kutta_step(
+    tableau: Tableau, field: VectorField, x: np.ndarray, t: float, h: float
+) -> RungeKuttaStep:
     """x (n,) at time t to one h [s] later."""
-    return (_forward if tableau.explicit else _newton)(tableau, flow, x, t, h)
+    return (_explicit_step if tableau.explicit else _implicit_step)(tableau, field, x, t, h)
 
 
-def integrate(
-    tableau: Tableau, flow: Flow, x: np.ndarray, h: float, steps: int
+def runge_kutta_integrate(
+    tableau: Tableau, field: VectorField, x: np.ndarray, h: float, steps: int
 ) -> tuple[np.ndarray, int]:
     """x after `steps` steps of h from t = 0, and the evaluations of f that took. Once a step
     fails the rest is NaN."""
     evaluations = 0
     for k in range(steps):
-        done = step(tableau, flow, x, k * h, h)
+        done = runge_kutta_step(tableau, field, x, k * h, h)
         x, evaluations = done.x, evaluations + done.evaluations
         if done.status:
             return np.full_like(x, np.nan), evaluations
@@ -123,14 +125,14 @@ def order_conditions(tableau: Tableau) -> np.ndarray:
 
 def order(tableau: Tableau) -> int:
     """The order p as far as the conditions up to 4 tell: 0 (not consistent) to 4 (or more)."""
-    off = np.abs(order_conditions(tableau)) > EXACT
+    off = np.abs(order_conditions(tableau)) > ORDER_TOLERANCE
     for p, (first, last) in enumerate(pairwise((0, 1, 2, 4, 8))):
         if off[first:last].any():
             return p
     return 4
 
 
-def parse(text: str) -> Tableau:
+def parse_tableau(text: str) -> Tableau:
     """A tableau as it is typed: one row a line (or after a semicolon), "c | a_i1 a_i2 ...", the
     last one "| b_1 b_2 ...". Numbers are decimals or fractions; zeros at a row's end may be left
     out. Raises LabError, its message a sentence that names the row."""
@@ -149,7 +151,7 @@ def parse(text: str) -> Tableau:
             raise LabError(f"row {i + 1} ({line!r}) needs one number, c, before its bar '|'")
         c[i] = left[0]
         a[i, : len(weights)] = weights
-        if abs(a[i].sum() - c[i]) > EXACT:
+        if abs(a[i].sum() - c[i]) > ORDER_TOLERANCE:
             raise LabError(
                 f"row {i + 1}: c = {c[i]:g} but its a add up to {a[i].sum():g}; "
                 "c_i is the sum of the a_ij"
@@ -174,36 +176,40 @@ def gauss_legendre(q: int) -> Tableau:
     return Tableau((c[:, None] ** powers / powers) @ lagrange, (1.0 / powers) @ lagrange, c)
 
 
-def _forward(tableau: Tableau, flow: Flow, x: np.ndarray, t: float, h: float) -> Step:
+def _explicit_step(
+    tableau: Tableau, field: VectorField, x: np.ndarray, t: float, h: float
+) -> RungeKuttaStep:
     """Each stage from those before it."""
-    a, c, f = h * tableau.a, h * tableau.c, flow.f
+    a, c, f = h * tableau.a, h * tableau.c, field.f
     k = np.empty((tableau.stages, len(x)))
     k[0] = f(x, t)
     for i in range(1, tableau.stages):
         k[i] = f(x + a[i, :i] @ k[:i], t + c[i])
-    return Step(x + h * (tableau.b @ k), tableau.stages, 0, 0.0, "")
+    return RungeKuttaStep(x + h * (tableau.b @ k), tableau.stages, 0, 0.0, "")
 
 
-def _newton(tableau: Tableau, flow: Flow, x: np.ndarray, t: float, h: float) -> Step:
+def _implicit_step(
+    tableau: Tableau, field: VectorField, x: np.ndarray, t: float, h: float
+) -> RungeKuttaStep:
     """All stages at once: zero of G_i(k) = k_i - f(x + h sum_j a_ij k_j, t + c_i h), whose
     derivative by k_j is [i = j] I - h a_ij df/dx at stage i."""
     q, n = tableau.stages, len(x)
     a, times = h * tableau.a, t + h * tableau.c
-    k = np.tile(flow.f(x, t), (q, 1))
+    k = np.tile(field.f(x, t), (q, 1))
     evaluations, residual = 1, np.inf
     for iteration in range(NEWTON_STEPS + 1):
         points = x + a @ k
-        slopes = np.array([flow.f(p, s) for p, s in zip(points, times, strict=True)])
+        slopes = np.array([field.f(p, s) for p, s in zip(points, times, strict=True)])
         evaluations += q
         defect = k - slopes
         residual = float(np.abs(defect).max())
         if not np.isfinite(residual):
             break
-        if residual <= TOLERANCE * (1.0 + float(np.abs(slopes).max())):
-            return Step(x + h * (tableau.b @ k), evaluations, iteration, residual, "")
+        if residual <= NEWTON_TOLERANCE * (1.0 + float(np.abs(slopes).max())):
+            return RungeKuttaStep(x + h * (tableau.b @ k), evaluations, iteration, residual, "")
         if iteration == NEWTON_STEPS:
             break
-        derivatives = np.array([flow.jacobian(p, s) for p, s in zip(points, times, strict=True)])
+        derivatives = np.array([field.jacobian(p, s) for p, s in zip(points, times, strict=True)])
         evaluations += q * n
         blocks = np.eye(q * n).reshape(q, n, q, n) - np.einsum("ij,imn->imjn", a, derivatives)
         try:
@@ -212,7 +218,7 @@ def _newton(tableau: Tableau, flow: Flow, x: np.ndarray, t: float, h: float) -> 
             break
         k = k - change.reshape(q, n)
     why = f"Newton's method found no stages in {iteration} steps: residual {residual:.1e}."
-    return Step(x + h * (tableau.b @ k), evaluations, iteration, residual, why)
+    return RungeKuttaStep(x + h * (tableau.b @ k), evaluations, iteration, residual, why)
 
 
 def _row(line: str, name: str, q: int) -> tuple[list[float], list[float]]:
@@ -231,17 +237,17 @@ def _number(word: str, name: str) -> float:
         value = float(Fraction(word.replace("−", "-")))
     except (ValueError, ZeroDivisionError, OverflowError):
         raise LabError(f"{name}: {word!r} is no number; write 0.25 or 1/4") from None
-    if abs(value) > LARGEST:
-        raise LabError(f"{name}: {word} is beyond ±{LARGEST:g}")
+    if abs(value) > LARGEST_COEFFICIENT:
+        raise LabError(f"{name}: {word} is beyond ±{LARGEST_COEFFICIENT:g}")
     return value
 
 
-EULER = parse("0 | ; | 1")
-MIDPOINT = parse("0 | ; 1/2 | 1/2; | 0 1")
-HEUN = parse("0 | ; 1 | 1; | 1/2 1/2")
-RK3 = parse("0 | ; 1/2 | 1/2; 1 | -1 2; | 1/6 2/3 1/6")
-RK4 = parse("0 | ; 1/2 | 1/2; 1/2 | 0 1/2; 1 | 0 0 1; | 1/6 1/3 1/3 1/6")
-IMPLICIT_EULER = parse("1 | 1; | 1")
+EULER = parse_tableau("0 | ; | 1")
+MIDPOINT = parse_tableau("0 | ; 1/2 | 1/2; | 0 1")
+HEUN = parse_tableau("0 | ; 1 | 1; | 1/2 1/2")
+RK3 = parse_tableau("0 | ; 1/2 | 1/2; 1 | -1 2; | 1/6 2/3 1/6")
+RK4 = parse_tableau("0 | ; 1/2 | 1/2; 1/2 | 0 1/2; 1 | 0 0 1; | 1/6 1/3 1/3 1/6")
+IMPLICIT_EULER = parse_tableau("1 | 1; | 1")
 TABLEAUS: Mapping[str, Tableau] = {
     "euler": EULER,
     "midpoint": MIDPOINT,

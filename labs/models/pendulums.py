@@ -14,7 +14,7 @@ from functools import cache, cached_property
 import numpy as np
 import pinocchio as pin
 
-from labs.algorithms.runge_kutta import Flow
+from labs.algorithms.runge_kutta import VectorField
 from labs.models.arms import Arm
 from labs.shapes import Box, Cylinder, Sphere, Vector3, primitive, translation
 
@@ -56,8 +56,8 @@ class Pendulum:
         return derivative
 
     @property
-    def flow(self) -> Flow:
-        return Flow(self.f, self.jacobian)
+    def vector_field(self) -> VectorField:
+        return VectorField(self.f, self.jacobian)
 
     def energy(self, x: np.ndarray) -> float:
         """Kinetic and potential energy [J], zero at rest at x = 0."""

@@ -383,11 +383,11 @@ def test_handles_are_declared(entry: Entry) -> None:
 
 @every_lab
 def test_every_handle_that_is_drawn_acts(entry: Entry) -> None:
-    """Dragged by a little and out of the picture, beside a twin that is left alone."""
+    """Dragged by a little and out of the picture both ways, beside a twin that is left alone."""
     for changes, offered in offers(entry):
         for name, (x, y, z) in offered.handles.items():
             visible = False
-            for offset in (0.1, 1000.0):
+            for offset in (0.1, 1000.0, -1000.0):
                 with under((changes, name, offset)):
                     world, twin = begun(entry, changes), begun(entry, changes)
                     world.hold(name, (x + offset, y + offset, z + offset))

@@ -11,58 +11,70 @@ import numpy as np
 
 from labs.algorithms.absolute_stability import (
     StabilityFunction,
-    boundary,
-    largest_step,
-    measured_limit,
+    largest_stable_step,
+    measured_stability_limit,
+    stability_boundary,
 )
+from labs.algorithms.discretisation import linear_step
 from labs.algorithms.integrators import semi_implicit_euler
-from labs.algorithms.runge_kutta import TABLEAUS, Step, Tableau, parse, step
-from labs.appendix.integration.convergence import Stepper, exact, global_errors, local_errors
+from labs.algorithms.runge_kutta import (
+    TABLEAUS,
+    RungeKuttaStep,
+    Tableau,
+    parse_tableau,
+    runge_kutta_step,
+)
+from labs.appendix.integration.convergence import (
+    OneStepMethod,
+    exact_solution,
+    global_errors,
+    local_errors,
+)
 from labs.models.pendulums import Pendulum, pendulum
-from labs.reactive_control.joint_control.sampled_stability import one_step
 
-DURATION, COUNTS = 0.5, (10, 20, 40, 80, 160, 320)
+DURATION, STEP_COUNTS = 0.5, (10, 20, 40, 80, 160, 320)
 """[s] and numbers of steps of the study of errors."""
-LADDER = DURATION / np.array(COUNTS)
-LOCAL_FROM = 0.2
+STEP_SIZES = DURATION / np.array(STEP_COUNTS)
+LOCAL_ERROR_TIME = 0.2
 """[s] where the local errors are taken: in mid-swing."""
-SHORTEST, LONGEST, HIGHEST = 1e-4, 2.0, 2.5
+SHORTEST_STEP, LONGEST_STEP, HIGHEST_GROWTH = 1e-4, 2.0, 2.5
 """Steps [s] between which a limit is looked for, and the growth shown."""
-REACH = 4.0
+REGION_RADIUS = 4.0
 """Of the region of stability shown."""
-GRID = np.geomspace(0.02, LONGEST, 160)
+GROWTH_STEPS = np.geomspace(0.02, LONGEST_STEP, 160)
 
 
 @lru_cache(maxsize=64)
 def tableau_of(text: str) -> Tableau:
     """The named one, or the one the text spells."""
-    return TABLEAUS[text] if text in TABLEAUS else parse(text)
+    return TABLEAUS[text] if text in TABLEAUS else parse_tableau(text)
 
 
 @lru_cache(maxsize=64)
-def stepper_of(text: str, rods: int, friction: float) -> Stepper:
+def one_step_method(text: str, rods: int, friction: float) -> OneStepMethod:
     """One step of a method."""
     plant = pendulum(rods, friction)
     if text != "semi":
-        tableau, flow = tableau_of(text), plant.flow
-        return lambda x, t, h: step(tableau, flow, x, t, h)
+        tableau, field = tableau_of(text), plant.vector_field
+        return lambda x, t, h: runge_kutta_step(tableau, field, x, t, h)
 
-    def semi_implicit(x: np.ndarray, t: float, h: float) -> Step:
+    def semi_implicit(x: np.ndarray, t: float, h: float) -> RungeKuttaStep:
         q, v = semi_implicit_euler(plant.acceleration, x[:rods], x[rods:], h)
-        return Step(np.concatenate([q, v]), 1, 0, 0.0, "")
+        return RungeKuttaStep(np.concatenate([q, v]), 1, 0, 0.0, "")
 
     return semi_implicit
 
 
 @lru_cache(maxsize=4)
-def _reference(rods: int, friction: float, start: float) -> tuple[np.ndarray, ...]:
-    """x(DURATION), x(LOCAL_FROM) and (k, 2 nq) x(LOCAL_FROM + h) for h of LADDER."""
-    flow = pendulum(rods, friction).flow
+def _exact_motion(rods: int, friction: float, start: float) -> tuple[np.ndarray, ...]:
+    """x(DURATION), x(s) and (k, 2 nq) x(s + h) for h of STEP_SIZES, s = LOCAL_ERROR_TIME."""
+    field = pendulum(rods, friction).vector_field
     x = np.zeros(2 * rods)
     x[0] = start
-    middle = exact(flow, x, 0.0, LOCAL_FROM)
-    ends = np.array([exact(flow, middle, LOCAL_FROM, LOCAL_FROM + h) for h in LADDER])
-    return exact(flow, middle, LOCAL_FROM, DURATION), middle, ends
+    s = LOCAL_ERROR_TIME
+    middle = exact_solution(field, x, 0.0, s)
+    ends = np.array([exact_solution(field, middle, s, s + h) for h in STEP_SIZES])
+    return exact_solution(field, middle, s, DURATION), middle, ends
 
 
 @lru_cache(maxsize=64)
@@ -70,39 +82,42 @@ def errors_and_limit(
     text: str, rods: int, friction: float, start: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Global errors (k,), local errors (k,), costs (k,) and the largest step [s] of a method."""
-    advance = stepper_of(text, rods, friction)
-    end, middle, ends = _reference(rods, friction, start)
+    advance = one_step_method(text, rods, friction)
+    end, middle, ends = _exact_motion(rods, friction, start)
     x = np.zeros(2 * rods)
     x[0] = start
     with np.errstate(all="ignore"):
-        errors, costs = global_errors(advance, x, end, DURATION, COUNTS)
-        local = local_errors(advance, middle, LOCAL_FROM, ends, LADDER)
-        limit = _limit(text, rods, friction)
+        errors, costs = global_errors(advance, x, end, DURATION, STEP_COUNTS)
+        local = local_errors(advance, middle, LOCAL_ERROR_TIME, ends, STEP_SIZES)
+        limit = _largest_stable_step(text, rods, friction)
     return errors, local, costs, limit
 
 
 @lru_cache(maxsize=64)
-def _limit(text: str, rods: int, friction: float) -> float:
-    """The step [s] beyond which a small swing grows; LONGEST where none does, 0 where all do,
+def _largest_stable_step(text: str, rods: int, friction: float) -> float:
+    """The step [s] beyond which a small swing grows; LONGEST_STEP where none does, 0 where all do,
     however slowly."""
     plant = pendulum(rods, friction)
     if text != "semi":
-        found = largest_step(StabilityFunction.of(tableau_of(text)), plant.eigenvalues)
+        found = largest_stable_step(StabilityFunction.of(tableau_of(text)), plant.eigenvalues)
     else:
-        found = measured_limit(lambda h: _semi_implicit_growth(plant, h), SHORTEST, LONGEST)
-    return min(found, LONGEST)
+        found = measured_stability_limit(
+            lambda h: _semi_implicit_growth(plant, h), SHORTEST_STEP, LONGEST_STEP
+        )
+    return min(found, LONGEST_STEP)
 
 
 @lru_cache(maxsize=64)
-def growth_of(text: str, rods: int, friction: float) -> np.ndarray:
-    """(160,) what one step of GRID multiplies a small swing by, no more than HIGHEST: max |R(h
-    lambda)|, or for semi-implicit Euler the spectral radius of its linear step."""
+def growth_of_step(text: str, rods: int, friction: float) -> np.ndarray:
+    """(160,) what one step of GROWTH_STEPS multiplies a small swing by, no more than
+    HIGHEST_GROWTH: max |R(h lambda)|, or for semi-implicit Euler the spectral radius of its
+    linear step."""
     plant = pendulum(rods, friction)
     if text == "semi":
-        found = np.array([_semi_implicit_growth(plant, h) for h in GRID])
+        found = np.array([_semi_implicit_growth(plant, h) for h in GROWTH_STEPS])
     else:
-        found = StabilityFunction.of(tableau_of(text)).growth(GRID, plant.eigenvalues)
-    capped: np.ndarray = np.minimum(np.nan_to_num(found, nan=HIGHEST), HIGHEST)
+        found = StabilityFunction.of(tableau_of(text)).growth(GROWTH_STEPS, plant.eigenvalues)
+    capped: np.ndarray = np.minimum(np.nan_to_num(found, nan=HIGHEST_GROWTH), HIGHEST_GROWTH)
     return capped
 
 
@@ -110,11 +125,11 @@ def _semi_implicit_growth(plant: Pendulum, h: float) -> float:
     """The spectral radius of one step of h [s] near rest."""
     linear = plant.jacobian(np.zeros(2 * plant.model.nv), 0.0)
     no_input = np.zeros((len(linear), 0))
-    transition, _ = one_step("semi-implicit-euler", h, linear, no_input)
+    transition, _ = linear_step("semi-implicit-euler", h, linear, no_input)
     return float(np.abs(np.linalg.eigvals(transition)).max())
 
 
 @lru_cache(maxsize=64)
-def edge_of(text: str) -> np.ndarray:
-    """The edge of the region of stability, complex, as far as REACH."""
-    return boundary(StabilityFunction.of(tableau_of(text)), REACH)
+def stability_region_edge(text: str) -> np.ndarray:
+    """The edge of the region of stability, complex, as far as REGION_RADIUS."""
+    return stability_boundary(StabilityFunction.of(tableau_of(text)), REGION_RADIUS)

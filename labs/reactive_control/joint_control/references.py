@@ -68,7 +68,7 @@ def cycles_per_second(name: str, frequency: float, duration: float) -> float:
     }[name]
 
 
-def motion(
+def reference_motion(
     name: str, home: np.ndarray, amplitude: float, rate: float, phase: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """q_ref [rad], v_ref [rad/s], a_ref [rad/s^2], each (m, nv), at phases (m,) [cycles] that

@@ -17,8 +17,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from labs.algorithms.integrators import Acceleration, Step
-from labs.algorithms.joint_control import Law
+from labs.algorithms.integrators import Acceleration, IntegratorStep
+from labs.algorithms.joint_control import ControlLaw
 
 UNIT = 1e-4
 """[s] the unit of time counted here."""
@@ -27,6 +27,11 @@ UNIT = 1e-4
 def units(seconds: float) -> int:
     """This many seconds as a whole number of units."""
     return round(seconds / UNIT)
+
+
+def milliseconds(seconds: float) -> str:
+    """A time [s] in words: "2 ms"."""
+    return f"{1000 * seconds:g} ms"
 
 
 def time_between_ticks(period: int, step: int) -> int:
@@ -49,25 +54,25 @@ def ticks(since: int, period: int, step: int, steps: int) -> tuple[tuple[int, ..
 
 
 @dataclass(frozen=True)
-class Loop:
+class SampledLoop:
     """What does not change during one stretch of time."""
 
-    law: Law
+    law: ControlLaw
     limit: np.ndarray
     """(nv,) [N m]; infinite where nothing limits."""
     acceleration: Acceleration
     """Reads the torque in `held`."""
     held: np.ndarray
     """(nv,) [N m] the torque now; written at every tick."""
-    integrate: Step
+    integrate: IntegratorStep
     h: float
     """[s] length of an integration step."""
     integral_gain: float
     """[s] T while the law uses the integral of the error, else 0."""
 
 
-def run(
-    loop: Loop,
+def simulate_sampled(
+    loop: SampledLoop,
     due: tuple[int, ...],
     steps: int,
     reference: tuple[np.ndarray, np.ndarray, np.ndarray],

@@ -16,37 +16,42 @@ as fast as the last is at fault.
 """
 
 from dataclasses import dataclass
-from math import factorial
 
 import numpy as np
 import pinocchio as pin
-from scipy.linalg import expm
 
-from labs.algorithms.integrators import INTEGRATORS
-from labs.algorithms.joint_control import Gains, linearised, mass_matrix
+from labs.algorithms.discretisation import zero_order_hold, zero_order_hold_integrated
+from labs.algorithms.equation_of_motion import mass_matrix
+from labs.algorithms.joint_control import CONTROL_LAWS, Gains, linearise_law
+from labs.reactive_control.joint_control.sampled_control import UNIT, time_between_ticks, units
 
-GROWS = 1e-3
+GROWTH_TOLERANCE = 1e-3
 """[1/s] growth below this is not told from none: at a pole on the stability boundary, rounding
 alone is worth that much."""
 
-NEARLY = 0.6
+EXPLAINING_SHARE = 0.6
 """A loop that grows at least this fast, as a share of the simulated one, explains it. With
 k_d = 0 and T = h explicit Euler grows twice as fast as holding the torque alone would."""
 
 
 @dataclass(frozen=True)
-class Robot:
+class LinearisedRobot:
     """The robot near a posture: M dq'' + F dq' + G dq = d tau, each (nv, nv), G = dg/dq."""
 
     mass: np.ndarray
     friction: np.ndarray
     gravity: np.ndarray
+    load: np.ndarray
+    """g (nv,) [N m]: the torque that holds it there."""
 
     @classmethod
-    def near(cls, model: pin.Model, data: pin.Data, q: np.ndarray, friction: float) -> "Robot":
+    def near(
+        cls, model: pin.Model, data: pin.Data, q: np.ndarray, friction: float
+    ) -> "LinearisedRobot":
         """Linearised at rest at q (nq,), with viscous `friction` [N m s/rad] at every joint."""
         gravity = pin.computeGeneralizedGravityDerivatives(model, data, q)
-        return cls(mass_matrix(model, data, q), friction * np.eye(model.nv), gravity.copy())
+        load = pin.computeGeneralizedGravity(model, data, q).copy()
+        return cls(mass_matrix(model, data, q), friction * np.eye(model.nv), gravity.copy(), load)
 
     def dynamics(self) -> tuple[np.ndarray, np.ndarray]:
         """A (2n, 2n) and B (2n, n)."""
@@ -62,15 +67,20 @@ class Robot:
 
 
 @dataclass(frozen=True)
-class Setting:
-    """What a loop consists of, besides the robot. Times in seconds; `period` is the time
-    between ticks and a whole number of steps."""
+class LoopSettings:
+    """What a loop consists of, besides the robot. Times in seconds."""
 
     controller: str
     gains: Gains
-    period: float
+    control_period: float
+    """As it is set, at least the time between two ticks."""
     integrator: str
     step: float
+
+    @property
+    def period(self) -> float:
+        """Between two ticks: the control period rounded up to whole integration steps."""
+        return time_between_ticks(units(self.control_period), units(self.step)) * UNIT
 
 
 @dataclass(frozen=True)
@@ -88,87 +98,75 @@ class Diagnosis:
 class LinearLoop:
     """A robot and its controller near a posture; `model` is the controller's."""
 
-    robot: Robot
+    robot: LinearisedRobot
     model: pin.Model
     data: pin.Data
     q: np.ndarray
 
-    def poles(self, setting: Setting) -> np.ndarray:
+    def poles(self, settings: LoopSettings) -> np.ndarray:
         """Eigenvalues [1/s] of the loop under continuous control."""
         a, b = self.robot.dynamics()
-        return np.linalg.eigvals(self._closed(setting, a, b, 1.0, sampled=False))
+        return np.linalg.eigvals(self._closed(settings, a, b, 1.0, sampled=False))
 
-    def multipliers(self, setting: Setting, *, exact: bool = False) -> np.ndarray:
+    def multipliers(self, settings: LoopSettings, *, exact: bool = False) -> np.ndarray:
         """Eigenvalues of the map over one control period, the robot's motion between ticks
         integrated as set, or exactly."""
         a, b = self.robot.dynamics()
         phi, gamma = (
-            exactly_held(a, b, setting.period)
+            zero_order_hold(a, b, settings.period)
             if exact
-            else integrated(setting.integrator, setting.step, a, b, setting.period)
+            else zero_order_hold_integrated(
+                settings.integrator, settings.step, a, b, settings.period
+            )
         )
-        return np.linalg.eigvals(self._closed(setting, phi, gamma, setting.period, sampled=True))
+        return np.linalg.eigvals(self._closed(settings, phi, gamma, settings.period, sampled=True))
 
-    def growth(self, setting: Setting, *, exact: bool = False) -> float:
+    def growth(self, settings: LoopSettings, *, exact: bool = False) -> float:
         """sigma [1/s] of the sampled loop."""
-        radius = float(np.abs(self.multipliers(setting, exact=exact)).max())
-        return float(np.log(max(radius, 1e-300))) / setting.period
+        radius = float(np.abs(self.multipliers(settings, exact=exact)).max())
+        return float(np.log(max(radius, 1e-300))) / settings.period
 
-    def diagnose(self, setting: Setting) -> Diagnosis:
+    def sag(self, settings: LoopSettings) -> float:
+        """[rad] how far from q a joint comes to rest: what the law's torque at q lacks of the
+        load, over the stiffness, (K_q + G) dq = tau - g. None with an integral; infinite without
+        any stiffness."""
+        law = linearise_law(settings.controller, self.model, self.data, settings.gains, self.q)
+        zero = np.zeros_like(self.q)
+        torque = CONTROL_LAWS[settings.controller](self.model, self.data, settings.gains)
+        lacking = torque(self.q, zero, zero, self.q, zero, zero) - self.robot.load
+        if law.k_z.any() or np.abs(lacking).max() < 1e-9:
+            return 0.0
+        stiffness = law.k_q + self.robot.gravity
+        if np.linalg.matrix_rank(stiffness) < len(zero):
+            return np.inf
+        return float(np.abs(np.linalg.solve(stiffness, lacking)).max())
+
+    def diagnose(self, settings: LoopSettings) -> Diagnosis:
         """Which of the three loops is the first to be at fault."""
-        continuous = float(self.poles(setting).real.max())
-        sampled, simulated = self.growth(setting, exact=True), self.growth(setting)
+        continuous = float(self.poles(settings).real.max())
+        sampled, simulated = self.growth(settings, exact=True), self.growth(settings)
         rates = {"gains": continuous, "period": sampled, "integrator": simulated}
         fault = ""
-        if simulated > GROWS:
-            fault = next(name for name, rate in rates.items() if rate >= NEARLY * simulated)
+        if simulated > GROWTH_TOLERANCE:
+            fault = next(
+                name for name, rate in rates.items() if rate >= EXPLAINING_SHARE * simulated
+            )
         return Diagnosis(continuous, sampled, simulated, fault)
 
     def _closed(
-        self, setting: Setting, phi: np.ndarray, gamma: np.ndarray, period: float, *, sampled: bool
+        self,
+        settings: LoopSettings,
+        phi: np.ndarray,
+        gamma: np.ndarray,
+        period: float,
+        *,
+        sampled: bool,
     ) -> np.ndarray:
         """x and z together: u = -K x + k_z z, and z' = -dq or z+ = z - T dq."""
-        law = linearised(setting.controller, self.model, self.data, setting.gains, self.q)
+        law = linearise_law(settings.controller, self.model, self.data, settings.gains, self.q)
         n = len(self.q)
         from_x = phi - gamma @ np.hstack([law.k_q, law.k_v])
         if not law.k_z.any():
             return np.asarray(from_x)
         to_z = np.hstack([-period * np.eye(n), np.zeros((n, n))])
         return np.block([[from_x, gamma @ law.k_z], [to_z, np.eye(n) * sampled]])
-
-
-def exactly_held(a: np.ndarray, b: np.ndarray, period: float) -> tuple[np.ndarray, np.ndarray]:
-    """Phi = exp(A T) and Gamma = int_0^T exp(A s) ds B, both from one exponential."""
-    n, m = b.shape
-    both = expm(np.block([[a, b], [np.zeros((m, n + m))]]) * period)
-    return both[:n, :n], both[:n, n:]
-
-
-def integrated(
-    integrator: str, step: float, a: np.ndarray, b: np.ndarray, period: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Phi and Gamma as this integrator makes them, in period/step steps with u held."""
-    p, q = one_step(integrator, step, a, b)
-    n, m = b.shape
-    both = np.block([[p, q], [np.zeros((m, n)), np.eye(m)]])
-    power = np.linalg.matrix_power(both, round(period / step))
-    return power[:n, :n], power[:n, n:]
-
-
-def one_step(
-    integrator: str, h: float, a: np.ndarray, b: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """P and Q of x+ = P x + Q u over one step. A Runge-Kutta method of as many stages as its
-    order p (up to 4) has P = sum_(k<=p) (hA)^k / k! and Q = h sum_(k<p) (hA)^k / (k+1)! B."""
-    eye = np.eye(len(a))
-    if integrator == "semi-implicit-euler":
-        half = len(a) // 2
-        drift = eye + h * np.eye(len(a), k=half)
-        kick = eye.copy()
-        kick[half:] += h * a[half:]
-        return drift @ kick, drift @ (h * b)
-    order = INTEGRATORS[integrator].order
-    powers = [np.linalg.matrix_power(h * a, k) for k in range(order + 1)]
-    p = sum(power / factorial(k) for k, power in enumerate(powers))
-    q = sum(power / factorial(k + 1) for k, power in enumerate(powers[:-1]))
-    return np.asarray(p), h * np.asarray(q) @ b

@@ -5,7 +5,7 @@ A step of the reference leaves the error e0 = q_ref - q (nv,) [rad]; its size is
     overshoot       the farthest any joint goes beyond its reference, as a share of the size
     settling time   when the largest error last came within BAND of the size
 
-Both are what samples at the times of `after` show.
+Both are what samples at the times of `update` show.
 """
 
 from dataclasses import dataclass
@@ -34,14 +34,14 @@ class StepResponse:
     """[s] since the step; negative while not settled."""
 
     @classmethod
-    def to(cls, time: float, error: np.ndarray) -> "StepResponse | None":
+    def begin(cls, time: float, error: np.ndarray) -> "StepResponse | None":
         """The response to a step that leaves this error; None when there is no step."""
         size = float(np.abs(error).max())
         error = error.copy()
         error.flags.writeable = False
         return cls(time, error, size) if size > SMALLEST else None
 
-    def after(self, time: float, error: np.ndarray) -> "StepResponse":
+    def update(self, time: float, error: np.ndarray) -> "StepResponse":
         """With the error e (nv,) [rad] at this time [s] taken into account."""
         beyond = float((-np.sign(self.error) * error).max()) / self.size
         inside = float(np.abs(error).max()) <= BAND * self.size

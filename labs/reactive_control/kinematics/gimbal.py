@@ -12,7 +12,7 @@ from labs.algorithms.orientation import (
     matrix_to_euler,
 )
 
-CIRCLE = np.linspace(0.0, 2.0 * np.pi, 49)
+CIRCLE_ANGLES = np.linspace(0.0, 2.0 * np.pi, 49)
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,8 @@ class Gimbal:
         the bearings of the second; the inner turns by theta in them and carries the third. At the
         lock the rings lie in one plane."""
         first, second, third = self.axes(rotation)
-        return _circle(first, second), _circle(second, third)
+        return _unit_circle(first, second), _unit_circle(second, third)
 
 
-def _circle(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    return np.outer(np.cos(CIRCLE), u) + np.outer(np.sin(CIRCLE), v)
+def _unit_circle(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    return np.outer(np.cos(CIRCLE_ANGLES), u) + np.outer(np.sin(CIRCLE_ANGLES), v)

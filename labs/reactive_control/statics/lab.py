@@ -2,31 +2,28 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import pinocchio as pin
 
 from labs.lab import Action, Handle, Inputs, Lab, Measurement, State
-from labs.models.arms import load
 from labs.models.plant import plant
-from labs.models.postures import POSTURES, ROBOTS, posture
-from labs.params import Group, Params, Value
+from labs.params import Value
 from labs.plots import Bars, Line, Matrix, Readout, TimeSeries
-from labs.scene import Color, Scene
+from labs.reactive_control.statics.params import StaticsParams
+from labs.scene import Scene
+from labs.tasks.arm.torque_arcs import FULL_ARC, LONGEST_ARC, draw_torque_arcs
 
-ARROW = 1.0 / 600.0
+FORCE_ARROW = 1.0 / 600.0
 """[m/N] length of the force's arrow."""
-TWIST = 0.6
+VELOCITY_ARROW = 0.6
 """[s] length of the velocity's arrow over the velocity."""
-STRONGEST = 500.0
+STRONGEST_PULL = 500.0
 """[N] beyond which dragging pulls no harder."""
-FULL_ARC = 4.5
-"""[rad] an arc at its torque limit spans; a moment of `FULL_MOMENT` as much."""
-LONGEST_ARC = 6.0
 FULL_MOMENT = 40.0
-"""[N m]"""
-FEWEST = 1e-9
+"""[N m] whose arc is as long as that of a torque at its limit."""
+NO_FORCE = 1e-9
 """[N] forces below are none."""
 CAMERA = {
     "ur5": ((1.05, -0.92, 0.8), (0.3, 0.05, 0.4)),
@@ -35,124 +32,11 @@ CAMERA = {
 }
 
 
-POSTURE = Group("Posture")
-VELOCITY_OF_THE_JOINTS = Group("Velocity of the joints")
-WRENCH_AT_THE_END_EFFECTOR = Group("Wrench at the end-effector")
-
-
-def _turn(joint: int) -> Any:
-    return POSTURE.knob(
-        0.0,
-        -3.14,
-        3.14,
-        f"\\Delta q_{joint}",
-        "rad",
-        f"Joint {joint}",
-        step=0.01,
-        help="Turns this joint away from the posture chosen. Without effect where the robot has "
-        "no such joint.",
-    )
-
-
-def _speed(joint: int, default: float = 0.0) -> Any:
-    return VELOCITY_OF_THE_JOINTS.knob(
-        default,
-        -2.0,
-        2.0,
-        f"\\dot q_{joint}",
-        "rad/s",
-        f"Joint {joint}",
-        step=0.01,
-        help="The motion whose power is reckoned; the arm itself stays where it is.",
-    )
-
-
-def _force(axis: str, default: float) -> Any:
-    return WRENCH_AT_THE_END_EFFECTOR.knob(
-        default,
-        -300.0,
-        300.0,
-        f"f_{axis}",
-        "N",
-        f"Force {axis}",
-        step=1.0,
-        help="In the world's axes. What was dragged in the scene adds to it.",
-    )
-
-
-def _moment(axis: str) -> Any:
-    return WRENCH_AT_THE_END_EFFECTOR.knob(
-        0.0,
-        -40.0,
-        40.0,
-        f"m_{axis}",
-        "N·m",
-        f"Moment {axis}",
-        step=0.1,
-        help="In the world's axes, drawn as an arc around the end-effector.",
-    )
-
-
-class StaticsParams(Params):
-    """What the user can turn."""
-
-    robot: str = POSTURE.choice(
-        "ur5", {name: load(name).title for name in ROBOTS}, "Robot", effect="restart"
-    )
-    """The arm that is pulled at."""
-    posture: str = POSTURE.choice("home", POSTURES, "Posture")
-    """What the joint sliders turn."""
-    q1: float = _turn(1)
-    q2: float = _turn(2)
-    q3: float = _turn(3)
-    q4: float = _turn(4)
-    q5: float = _turn(5)
-    q6: float = _turn(6)
-    q7: float = _turn(7)
-    fx: float = _force("x", 60.0)
-    fy: float = _force("y", 0.0)
-    fz: float = _force("z", -120.0)
-    mx: float = _moment("x")
-    my: float = _moment("y")
-    mz: float = _moment("z")
-    dq1: float = _speed(1, -0.3)
-    dq2: float = _speed(2, 0.5)
-    dq3: float = _speed(3, -1.0)
-    dq4: float = _speed(4)
-    dq5: float = _speed(5)
-    dq6: float = _speed(6)
-    dq7: float = _speed(7)
-
-    @property
-    def q(self) -> np.ndarray:
-        """(nq,) [rad]: the posture, each joint turned by its slider."""
-        base = posture(self.robot, self.posture)
-        turned = (self.q1, self.q2, self.q3, self.q4, self.q5, self.q6, self.q7)
-        q: np.ndarray = base + np.array(turned[: len(base)])
-        return q
-
-    @property
-    def dq(self) -> np.ndarray:
-        """q' (nv,) [rad/s]."""
-        speeds = (self.dq1, self.dq2, self.dq3, self.dq4, self.dq5, self.dq6, self.dq7)
-        return np.array(speeds[: load(self.robot).model.nv])
-
-    @property
-    def force(self) -> np.ndarray:
-        """(3,) [N] what the sliders say."""
-        return np.array([self.fx, self.fy, self.fz])
-
-    @property
-    def moment(self) -> np.ndarray:
-        """(3,) [N m]"""
-        return np.array([self.mx, self.my, self.mz])
-
-
 @dataclass(kw_only=True)
 class StaticsState(State):
     """What the hand did: the rest follows from the parameters."""
 
-    pulled: np.ndarray
+    pull: np.ndarray
     """(3,) [N] dragged at the arrow's tip, on top of the sliders."""
     steps: int = 0
 
@@ -165,8 +49,6 @@ class Load:
     """(3,) [m]"""
     jacobian: np.ndarray
     """(6, nv): the twist of the end-effector, in the world's axes, is J q'."""
-    joints: np.ndarray
-    """(nv, 3) [m] where the joints are."""
     wrench: np.ndarray
     """(6,) [N, N m] force and moment at the end-effector, in the world's axes."""
 
@@ -234,18 +116,18 @@ class Statics(Lab[StaticsParams, StaticsState]):
 
     def init(self, params: StaticsParams, rng: np.random.Generator) -> StaticsState:
         """Nothing dragged yet."""
-        return StaticsState(pulled=np.zeros(3))
+        return StaticsState(pull=np.zeros(3))
 
     def step(self, params: StaticsParams, inputs: Inputs, state: StaticsState) -> StaticsState:
         """Time passes, nothing moves. While the arrow's tip is held at x_h the whole force is
-        (x_h - p_e) / ARROW; released, what differs from the sliders' force stays."""
-        pulled = np.zeros(3) if "let_go" in inputs.actions else state.pulled.copy()
+        (x_h - p_e) / FORCE_ARROW; released, what differs from the sliders' force stays."""
+        pull = np.zeros(3) if "let_go" in inputs.actions else state.pull.copy()
         if (held := inputs.handles.get("pull")) is not None:
-            wanted = (np.array(held) - plant(params.robot).tip(params.q)) / ARROW
+            wanted = (np.array(held) - plant(params.robot).tip(params.q)) / FORCE_ARROW
             size = float(wanted @ wanted) ** 0.5
-            pulled = wanted * (STRONGEST / max(size, STRONGEST)) - params.force
+            pull = wanted * (STRONGEST_PULL / max(size, STRONGEST_PULL)) - params.force
         steps = state.steps + 1
-        return StaticsState(t=steps * self.period, pulled=pulled, steps=steps)
+        return StaticsState(t=steps * self.period, pull=pull, steps=steps)
 
     def measure(self, params: StaticsParams, state: StaticsState) -> Measurement:
         """Torque, and the power reckoned at the joints and at the end-effector."""
@@ -265,7 +147,7 @@ class Statics(Lab[StaticsParams, StaticsState]):
             "moment": _norm(load.wrench[3:]),
             "effort": _norm(tau),
         }
-        if force > FEWEST:
+        if force > NO_FORCE:
             measured["arm_length"] = _norm(load.jacobian[:3].T @ load.wrench[:3]) / force
         return measured
 
@@ -282,27 +164,22 @@ class Statics(Lab[StaticsParams, StaticsState]):
 
     def draw(self, scene: Scene, params: StaticsParams, state: StaticsState) -> None:
         """The arm, the wrench, and a torque arc at every joint, red beyond the motor's limit."""
-        load, arm = _load(params, state), plant(params.robot).arm
-        tau, tip = load.torque, load.tip
+        load, world = _load(params, state), plant(params.robot)
+        arm, tau, tip = world.arm, load.torque, load.tip
         scene.camera(*CAMERA[params.robot])
         scene.arm("robot", arm, params.q, effort=np.abs(tau) / arm.torque_limit)
-        for i, share in enumerate(tau / arm.torque_limit):
-            if abs(angle := FULL_ARC * share) > 0.03:
-                angle = float(np.clip(angle, -LONGEST_ARC, LONGEST_ARC))
-                color: Color = "warning" if abs(share) >= 1.0 else "force"
-                axis = load.jacobian[3:, i]
-                scene.arc(f"torque {i + 1}", load.joints[i], axis, angle, 0.14, color)
-        end = tip + ARROW * load.wrench[:3]
+        draw_torque_arcs(scene, world, params.q, tau)
+        end = tip + FORCE_ARROW * load.wrench[:3]
         if np.linalg.norm(end - tip) > 0.01:
             scene.arrow("force", tip, end)
         if (moment := _norm(params.moment)) > 0.01:
             angle = min(FULL_ARC * moment / FULL_MOMENT, LONGEST_ARC)
             scene.arc("moment", tip, params.moment / moment, angle, 0.1, "reference")
-        velocity = TWIST * (load.jacobian[:3] @ params.dq)
+        velocity = VELOCITY_ARROW * (load.jacobian[:3] @ params.dq)
         if np.linalg.norm(velocity) > 0.01:
             scene.arrow("velocity", tip, tip + velocity, "actual")
-        main = np.linalg.svd(load.jacobian[:3], full_matrices=False)[0]
-        cheapest = 0.45 * main[:, -1]
+        directions = np.linalg.svd(load.jacobian[:3], full_matrices=False)[0]
+        cheapest = 0.45 * directions[:, -1]
         scene.trail("cheapest direction", np.array([tip - cheapest, tip + cheapest]), "muted")
         scene.handle("pull", end, 0.04)
 
@@ -314,9 +191,8 @@ def _load(params: StaticsParams, state: StaticsState) -> Load:
     jacobian = pin.computeFrameJacobian(
         world.model, world.data, params.q, world.arm.tip, axes
     ).copy()
-    joints = np.array([world.data.oMi[j].translation for j in range(1, world.model.njoints)])
-    wrench = np.concatenate([params.force + state.pulled, params.moment])
-    return Load(tip, jacobian, joints, wrench)
+    wrench = np.concatenate([params.force + state.pull, params.moment])
+    return Load(tip, jacobian, wrench)
 
 
 def _norm(vector: np.ndarray) -> float:

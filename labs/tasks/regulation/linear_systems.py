@@ -15,6 +15,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 
+from labs.algorithms.discretisation import repeat_held
 from labs.algorithms.integrators import rk4
 from labs.errors import LabError
 from labs.models.arms import load
@@ -145,14 +146,11 @@ def _at_rest(
 
 @lru_cache(maxsize=32)
 def _linear(name: str, period: float) -> tuple[np.ndarray, np.ndarray]:
-    """[A B; 0 I] over one SIMULATION_STEP, to the power of their number."""
+    """Of the steps in a period, u held."""
     steps = round(period / SIMULATION_STEP)
     if steps < 1 or abs(steps * SIMULATION_STEP - period) > 1e-9:
         raise LabError(f"T = {period} s: it takes whole steps of {SIMULATION_STEP} s, one at least")
     system = linear_system(name)
-    n, m = system.nx, system.nu
     one = Discrete(system.mechanism, SIMULATION_STEP, "rk4")
     _, a, b = one.linearize(system.x_eq[None], system.u_eq[None])
-    both = np.block([[a[0], b[0]], [np.zeros((m, n)), np.eye(m)]])
-    power = np.linalg.matrix_power(both, steps)
-    return power[:n, :n].copy(), power[:n, n:].copy()
+    return repeat_held(a[0], b[0], steps)

@@ -7,19 +7,26 @@ import pytest
 
 from labs.algorithms.absolute_stability import (
     StabilityFunction,
-    boundary,
-    largest_step,
-    measured_limit,
+    largest_stable_step,
+    measured_stability_limit,
     reversed_characteristic,
+    stability_boundary,
 )
-from labs.algorithms.runge_kutta import TABLEAUS, Flow, Tableau, order, parse, step
+from labs.algorithms.runge_kutta import (
+    TABLEAUS,
+    Tableau,
+    VectorField,
+    order,
+    parse_tableau,
+    runge_kutta_step,
+)
 
 R = {name: StabilityFunction.of(tableau) for name, tableau in TABLEAUS.items()}
 
 
-def linear(m: np.ndarray) -> Flow:
+def linear(m: np.ndarray) -> VectorField:
     """x' = M x."""
-    return Flow(lambda x, t: m @ x, lambda x, t: m)
+    return VectorField(lambda x, t: m @ x, lambda x, t: m)
 
 
 @pytest.mark.parametrize(
@@ -48,7 +55,7 @@ def test_a_step_multiplies_by_r(name: str) -> None:
     """On x' = lambda x, complex lambda as a rotation with damping in the plane."""
     for lam in (-1.0 + 2.0j, 0.3 - 0.7j, 4.0j):
         m = np.array([[lam.real, -lam.imag], [lam.imag, lam.real]])
-        x = step(TABLEAUS[name], linear(m), np.array([1.0, 0.0]), 0.0, 0.3).x
+        x = runge_kutta_step(TABLEAUS[name], linear(m), np.array([1.0, 0.0]), 0.0, 0.3).x
         wanted = R[name](np.array(0.3 * lam))
         np.testing.assert_allclose(x, [wanted.real, wanted.imag], atol=1e-13)
 
@@ -63,14 +70,14 @@ def test_the_reversed_characteristic_polynomial_is_the_determinant() -> None:
 
 @pytest.mark.parametrize("name", ["euler", "midpoint", "rk3", "rk4", "implicit-euler"])
 def test_the_boundary_is_where_r_has_modulus_one_and_closes(name: str) -> None:
-    edge = boundary(R[name], reach=8.0)
+    edge = stability_boundary(R[name], reach=8.0)
     np.testing.assert_allclose(np.abs(R[name](edge)), 1.0, atol=1e-12)
     assert abs(edge[0] - edge[-1]) < 1e-9
     assert np.abs(np.diff(edge)).max() < 0.15, "no jumps"
     assert np.abs(edge).min() < 1e-5, "it passes through 0"
     # Symmetric about the real axis, and reaching as far to the left as the real limit.
     assert edge.imag.max() == pytest.approx(-edge.imag.min(), abs=1e-3)
-    limit = largest_step(R[name], np.array([-1.0]))
+    limit = largest_stable_step(R[name], np.array([-1.0]))
     if np.isfinite(limit):
         axis = edge[np.abs(edge.imag) < 0.03].real
         assert axis.min() == pytest.approx(-limit, abs=1e-3)
@@ -78,16 +85,16 @@ def test_the_boundary_is_where_r_has_modulus_one_and_closes(name: str) -> None:
 
 def test_the_boundary_of_gauss_legendre_is_the_imaginary_axis() -> None:
     for name in ("implicit-midpoint", "gauss-legendre"):
-        edge = boundary(R[name], reach=5.0)
+        edge = stability_boundary(R[name], reach=5.0)
         assert np.abs(edge.real).max() < 1e-10
         assert edge.imag.max() > 4.0
         assert edge.imag.min() < -4.0
 
 
 def test_odd_tableaus_have_a_boundary_or_none() -> None:
-    assert len(boundary(StabilityFunction.of(parse("0 | ; | 0")), 4.0)) == 0
+    assert len(stability_boundary(StabilityFunction.of(parse_tableau("0 | ; | 0")), 4.0)) == 0
     for text in ("0 | ; 1 | 1; | 1/2 -1/2", "0 | ; 0 | 0; 0 | 0; | 1 1 1", "1 | 1; | 100"):
-        edge = boundary(StabilityFunction.of(parse(text)), 4.0)
+        edge = stability_boundary(StabilityFunction.of(parse_tableau(text)), 4.0)
         assert np.isfinite(edge).all()
 
 
@@ -108,11 +115,11 @@ SQRT3, SQRT8 = np.sqrt(3.0), np.sqrt(8.0)
     ],
 )
 def test_the_largest_steps_are_the_published_ones(name: str, imaginary: float, real: float) -> None:
-    assert largest_step(R[name], np.array([2.0j, -2.0j])) == pytest.approx(imaginary / 2)
-    assert largest_step(R[name], np.array([-0.5, 0.0])) == pytest.approx(real * 2)
+    assert largest_stable_step(R[name], np.array([2.0j, -2.0j])) == pytest.approx(imaginary / 2)
+    assert largest_stable_step(R[name], np.array([-0.5, 0.0])) == pytest.approx(real * 2)
 
 
-CASH_KARP = parse(
+CASH_KARP = parse_tableau(
     """0 |
     1/5  | 1/5
     3/10 | 3/40 9/40
@@ -143,7 +150,7 @@ def test_a_stabilised_method_keeps_the_small_coefficients_that_limit_it(
 ) -> None:
     """Without damping |R| touches 1 between and must not stop there."""
     tableau, wanted = chebyshev(stages, damping)
-    found = largest_step(StabilityFunction.of(tableau), np.array([-0.5]))
+    found = largest_stable_step(StabilityFunction.of(tableau), np.array([-0.5]))
     assert found == pytest.approx(2.0 * wanted, rel=1e-8)
 
 
@@ -161,7 +168,7 @@ def test_the_limit_of_six_damped_stages() -> None:
 def test_the_limit_scales_with_time(scale: float) -> None:
     tableau, wanted = chebyshev(6, 0.05)
     r = StabilityFunction.of(tableau)
-    assert largest_step(r, np.array([-scale])) == pytest.approx(wanted / scale, rel=1e-8)
+    assert largest_stable_step(r, np.array([-scale])) == pytest.approx(wanted / scale, rel=1e-8)
 
 
 def test_cash_karp_has_no_stable_step_without_friction() -> None:
@@ -170,43 +177,43 @@ def test_cash_karp_has_no_stable_step_without_friction() -> None:
     assert order(CASH_KARP) == 4  # "or more"
     r = StabilityFunction.of(CASH_KARP)
     assert r.p[5] == pytest.approx(1 / 120, rel=1e-14)
-    assert largest_step(r, np.array([5.4j, -5.4j])) == 0.0
+    assert largest_stable_step(r, np.array([5.4j, -5.4j])) == 0.0
     s = 0.1
     assert abs(r(np.array(1j * s))) - 1.0 == pytest.approx((1 / 720 - r.p[6]) * s**6, rel=0.01)
     # Hardly any friction, and there is a limit.
-    assert 0.0 < largest_step(r, np.array([5.4j - 1e-6])) < 0.1
+    assert 0.0 < largest_stable_step(r, np.array([5.4j - 1e-6])) < 0.1
 
 
 def test_a_reducible_tableau_has_the_limit_of_what_it_reduces_to() -> None:
-    twice = parse("0 | ; 1/2 | 0 1/2; | 1 0")  # the second stage, implicit, is not used
-    assert largest_step(StabilityFunction.of(twice), np.array([-1.0])) == pytest.approx(2.0)
+    twice = parse_tableau("0 | ; 1/2 | 0 1/2; | 1 0")  # the second stage, implicit, is not used
+    assert largest_stable_step(StabilityFunction.of(twice), np.array([-1.0])) == pytest.approx(2.0)
 
 
 def test_the_limit_of_euler_on_a_damped_oscillation() -> None:
     lam = -1.2 + 5.29j
-    found = largest_step(R["euler"], np.array([lam, lam.conjugate()]))
+    found = largest_stable_step(R["euler"], np.array([lam, lam.conjugate()]))
     assert found == pytest.approx(2.4 / abs(lam) ** 2, rel=1e-12)
 
 
 @pytest.mark.parametrize("name", ["euler", "midpoint", "rk3", "rk4"])
 def test_theory_and_the_limit_found_by_raising_h_agree(name: str) -> None:
     m = np.array([[0.0, 1.0], [-25.0, -2.0]])
-    flow = linear(m)
+    field = linear(m)
 
     def growth(h: float) -> float:
-        columns = [step(TABLEAUS[name], flow, unit, 0.0, h).x for unit in np.eye(2)]
+        columns = [runge_kutta_step(TABLEAUS[name], field, unit, 0.0, h).x for unit in np.eye(2)]
         return float(np.abs(np.linalg.eigvals(np.array(columns))).max())
 
-    theory = largest_step(R[name], np.linalg.eigvals(m))
-    assert measured_limit(growth, 1e-3, 2.0) == pytest.approx(theory, rel=1e-5)
+    theory = largest_stable_step(R[name], np.linalg.eigvals(m))
+    assert measured_stability_limit(growth, 1e-3, 2.0) == pytest.approx(theory, rel=1e-5)
     for h, grows in ((0.98 * theory, False), (1.02 * theory, True)):
         x = np.array([1e-3, 0.0])
         for _ in range(2000):
-            x = step(TABLEAUS[name], flow, x, 0.0, h).x
+            x = runge_kutta_step(TABLEAUS[name], field, x, 0.0, h).x
         assert (np.linalg.norm(x) > 1e-2) == grows
 
 
 def test_a_limit_that_is_not_there_is_zero_or_infinite() -> None:
-    assert measured_limit(lambda h: 1.1, 0.01, 2.0) == 0.0
-    assert measured_limit(lambda h: 0.9, 0.01, 2.0) == np.inf
-    assert measured_limit(lambda h: h, 0.01, 2.0) == pytest.approx(1.0, abs=1e-6)
+    assert measured_stability_limit(lambda h: 1.1, 0.01, 2.0) == 0.0
+    assert measured_stability_limit(lambda h: 0.9, 0.01, 2.0) == np.inf
+    assert measured_stability_limit(lambda h: h, 0.01, 2.0) == pytest.approx(1.0, abs=1e-6)

@@ -4,7 +4,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from labs.algorithms.equation_of_motion import Terms, direct, inverse, terms
+from labs.algorithms.equation_of_motion import (
+    EquationTerms,
+    direct_dynamics,
+    equation_terms,
+    inverse_dynamics,
+    mass_matrix,
+)
 from labs.models.plant import Plant, plant
 
 ROBOTS = ("ur5", "panda", "double-pendulum")
@@ -18,8 +24,8 @@ def states(robot: str, count: int = 5) -> list[tuple[Plant, np.ndarray, np.ndarr
     return [(world, rng.uniform(-2, 2, n), rng.uniform(-2, 2, n)) for _ in range(count)]
 
 
-def of(world: Plant, q: np.ndarray, v: np.ndarray) -> Terms:
-    return terms(world.model, world.data, q, v)
+def of(world: Plant, q: np.ndarray, v: np.ndarray) -> EquationTerms:
+    return equation_terms(world.model, world.data, q, v)
 
 
 def kinetic(world: Plant, q: np.ndarray, v: np.ndarray) -> float:
@@ -107,7 +113,7 @@ def test_gravity_is_the_slope_of_the_potential_energy(robot: str) -> None:
 def test_bias_is_the_torque_of_no_acceleration(robot: str) -> None:
     for world, q, v in states(robot):
         h = of(world, q, v).bias(v)
-        still = inverse(world.model, world.data, q, v, np.zeros(len(q)))
+        still = inverse_dynamics(world.model, world.data, q, v, np.zeros(len(q)))
         np.testing.assert_allclose(h, still, rtol=1e-12, atol=1e-12)
 
 
@@ -117,10 +123,12 @@ def test_the_two_problems_undo_one_another(robot: str) -> None:
     for world, q, v in states(robot):
         model, data = world.model, world.data
         a, tau = rng.uniform(-10, 10, (2, len(q)))
-        there = inverse(model, data, q, v, a)
-        np.testing.assert_allclose(direct(model, data, q, v, there), a, rtol=0, atol=1e-10)
-        back = direct(model, data, q, v, tau)
-        np.testing.assert_allclose(inverse(model, data, q, v, back), tau, rtol=0, atol=1e-10)
+        there = inverse_dynamics(model, data, q, v, a)
+        np.testing.assert_allclose(direct_dynamics(model, data, q, v, there), a, rtol=0, atol=1e-10)
+        back = direct_dynamics(model, data, q, v, tau)
+        np.testing.assert_allclose(
+            inverse_dynamics(model, data, q, v, back), tau, rtol=0, atol=1e-10
+        )
         found = of(world, q, v)
         np.testing.assert_allclose(found.mass @ back + found.bias(v), tau, rtol=0, atol=1e-10)
 
@@ -150,9 +158,22 @@ def test_the_double_pendulum_in_closed_form() -> None:
 def test_what_is_returned_is_no_workspace() -> None:
     (world, q, v), (_, other, _) = states("ur5", 2)
     model, data = world.model, world.data
-    first, a = of(world, q, v), direct(model, data, q, v, v)
-    tau = inverse(model, data, q, v, v)
+    first, a = of(world, q, v), direct_dynamics(model, data, q, v, v)
+    tau = inverse_dynamics(model, data, q, v, v)
     kept = [x.copy() for x in (first.mass, first.coriolis, first.gravity, a, tau)]
-    of(world, other, q), direct(model, data, other, q, q), inverse(model, data, other, q, q)
+    (
+        of(world, other, q),
+        direct_dynamics(model, data, other, q, q),
+        inverse_dynamics(model, data, other, q, q),
+    )
     for one, same in zip((first.mass, first.coriolis, first.gravity, a, tau), kept, strict=True):
         np.testing.assert_array_equal(one, same)
+
+
+@every_robot
+def test_the_mass_matrix_is_symmetric_and_positive(robot: str) -> None:
+    model = plant(robot).model
+    q = np.random.default_rng(3).normal(size=model.nq)
+    mass = mass_matrix(model, model.createData(), q)
+    np.testing.assert_array_equal(mass, mass.T)
+    assert np.linalg.eigvalsh(mass)[0] > 0

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from labs.algorithms.frame_chain import FrameChain, product
+from labs.algorithms.frame_chain import FrameChain, multiply_poses
 from labs.models.arms import load
 
 both_robots = pytest.mark.parametrize("robot", ["ur5", "panda"])
@@ -31,10 +31,12 @@ def test_the_product_is_the_pose_of_the_end_effector(robot: str) -> None:
     for q in postures(robot):
         factors = chain.factors(q)
         pin.framesForwardKinematics(arm.model, data, q)
-        np.testing.assert_allclose(product(factors), data.oMf[arm.tip].homogeneous, atol=1e-14)
+        np.testing.assert_allclose(
+            multiply_poses(factors), data.oMf[arm.tip].homogeneous, atol=1e-14
+        )
         for i in range(1, arm.model.nq):
             so_far = data.oMi[i].homogeneous
-            np.testing.assert_allclose(product(factors[:i]), so_far, atol=1e-14)
+            np.testing.assert_allclose(multiply_poses(factors[:i]), so_far, atol=1e-14)
 
 
 @both_robots
@@ -42,7 +44,7 @@ def test_every_matrix_is_a_pose(robot: str) -> None:
     chain = chain_of(robot)
     for q in postures(robot):
         factors = chain.factors(q)
-        for pose in (*factors, product(factors)):
+        for pose in (*factors, multiply_poses(factors)):
             rotation = pose[:3, :3]
             np.testing.assert_allclose(rotation.T @ rotation, np.eye(3), atol=2e-15)
             assert np.linalg.det(rotation) == pytest.approx(1.0, abs=2e-15)
@@ -58,7 +60,7 @@ def test_a_factor_depends_on_one_joint_and_the_product_on_all(robot: str) -> Non
     arm, chain = load(robot), chain_of(robot)
     data = arm.model.createData()
     for q in postures(robot):
-        found = chain.dependence(q)
+        found = chain.derivative_norms(q)
         assert found.shape == (len(q) + 1, len(q))
         off = found[:-1][~np.eye(len(q), dtype=bool)]
         np.testing.assert_array_equal(off, 0.0)
@@ -77,7 +79,7 @@ def test_two_links_in_closed_form() -> None:
     first, second = chain.factors(np.array([a, b]))
     np.testing.assert_allclose(first[:3, :3], [[1, 0, 0], [0, c, -s], [0, s, c]], atol=1e-15)
     np.testing.assert_allclose(first[:3, 3], [0.0, 0.0, 1.3], atol=1e-15)
-    tip = product([first, second])
+    tip = multiply_poses([first, second])
     place = [0.0, 0.5 * (s + np.sin(both)), 1.3 - 0.5 * (c + np.cos(both))]
     np.testing.assert_allclose(tip[:3, 3], place, atol=1e-15)
     c, s = np.cos(both), np.sin(both)

@@ -6,17 +6,19 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from labs.algorithms.inverse_kinematics import (
-    METHODS,
-    damped,
+    INVERSE_KINEMATICS_METHODS,
+    REACHED,
+    clip_norm,
+    damped_least_squares,
+    jacobian_transpose,
     joint_rates,
     manipulability,
+    nearest_distance,
     pose_error,
     pseudo_inverse,
-    shortened,
-    slowed,
-    transpose,
+    scale_to_speed_limit,
 )
-from labs.algorithms.jacobian import Kinematics, geometric
+from labs.algorithms.jacobian import ForwardKinematics, geometric_jacobian
 from labs.models.arms import load
 
 RNG = np.random.default_rng(11)
@@ -51,14 +53,14 @@ def test_damped_least_squares_minimises_what_it_says(m: int, n: int, sigma: list
     j, v, damping = matrix(m, n, sigma), RNG.normal(size=m), 0.3
     stacked = np.concatenate([j, damping * np.eye(n)])
     best = lsq_linear(stacked, np.concatenate([v, np.zeros(n)])).x
-    np.testing.assert_allclose(damped(j, v, damping), best, atol=1e-12)
+    np.testing.assert_allclose(damped_least_squares(j, v, damping), best, atol=1e-12)
 
 
 @pytest.mark.parametrize(("m", "n", "sigma"), SHAPES)
 def test_little_damping_is_the_pseudo_inverse(m: int, n: int, sigma: list[float]) -> None:
     j, v = matrix(m, n, sigma), RNG.normal(size=m)
     exact = pseudo_inverse(j, v)
-    errors = [np.abs(damped(j, v, damping) - exact).max() for damping in (1e-2, 1e-3)]
+    errors = [np.abs(damped_least_squares(j, v, damping) - exact).max() for damping in (1e-2, 1e-3)]
     assert errors[1] < 1.5e-2 * errors[0], "the error falls as lambda^2"
 
 
@@ -68,10 +70,12 @@ def test_damping_bounds_the_joint_speed_and_the_bound_is_tight() -> None:
             j = matrix(3, 6, sorted(10.0 ** RNG.uniform(-4, 1, 3), reverse=True))
             v = RNG.normal(size=3)
             bound = np.linalg.norm(v) / (2 * damping)
-            assert np.linalg.norm(damped(j, v, damping)) <= bound * (1 + 1e-12)
+            assert np.linalg.norm(damped_least_squares(j, v, damping)) <= bound * (1 + 1e-12)
         u = np.array([1.0, 0.0, 0.0])
         worst = damping * np.outer(u, np.eye(6)[0])
-        assert np.linalg.norm(damped(worst, u, damping)) == pytest.approx(1 / (2 * damping))
+        assert np.linalg.norm(damped_least_squares(worst, u, damping)) == pytest.approx(
+            1 / (2 * damping)
+        )
 
 
 def test_the_pseudo_inverse_has_no_bound_and_the_transpose_fades() -> None:
@@ -79,12 +83,12 @@ def test_the_pseudo_inverse_has_no_bound_and_the_transpose_fades() -> None:
         j = np.diag([1.0, 1.0, sigma])
         v = np.array([0.0, 0.0, 1.0])
         assert np.linalg.norm(pseudo_inverse(j, v)) == pytest.approx(1 / sigma)
-        assert np.linalg.norm(transpose(j, v)) == pytest.approx(sigma)
+        assert np.linalg.norm(jacobian_transpose(j, v)) == pytest.approx(sigma)
 
 
 def test_the_transpose_goes_down_the_gradient_of_the_squared_error() -> None:
     arm = load("ur5")
-    kinematics, target, d = Kinematics(arm.model, arm.tip), np.array([0.4, 0.3, 0.5]), 1e-6
+    kinematics, target, d = ForwardKinematics(arm.model, arm.tip), np.array([0.4, 0.3, 0.5]), 1e-6
 
     def half_square(q: np.ndarray) -> float:
         error = target - kinematics.at(q).placement.translation
@@ -93,23 +97,25 @@ def test_the_transpose_goes_down_the_gradient_of_the_squared_error() -> None:
     steps = d * np.eye(6)
     slope = [(half_square(arm.home + s) - half_square(arm.home - s)) / (2 * d) for s in steps]
     chain = kinematics.at(arm.home)
-    rates = transpose(geometric(chain)[:3], target - chain.placement.translation)
+    rates = jacobian_transpose(geometric_jacobian(chain)[:3], target - chain.placement.translation)
     np.testing.assert_allclose(rates, -np.array(slope), atol=1e-9)
 
 
 @pytest.mark.parametrize("robot", ["ur5", "panda", "scara"])
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", INVERSE_KINEMATICS_METHODS)
 def test_it_converges_to_a_pose_within_reach(method: str, robot: str) -> None:
     """From home to where known joint angles lead, all six rows."""
     arm = load(robot)
-    kinematics = Kinematics(arm.model, arm.tip)
+    kinematics = ForwardKinematics(arm.model, arm.tip)
     goal = kinematics.at(arm.home + 0.1 * np.linspace(-1, 1, arm.model.nv)).placement
     q = arm.home.copy()
     steps = {"pseudo-inverse": (0.5, 60), "damped": (0.5, 200), "transpose": (0.4, 1500)}
     gain, count = steps[method]
     for _ in range(count):
         chain = kinematics.at(q)
-        q = q + gain * joint_rates(method, geometric(chain), pose_error(chain.placement, goal), 0.1)
+        q = q + gain * joint_rates(
+            method, geometric_jacobian(chain), pose_error(chain.placement, goal), 0.1
+        )
     assert np.abs(pose_error(kinematics.at(q).placement, goal)).max() < 1e-8
     np.testing.assert_allclose(pose_error(goal, goal), np.zeros(6), atol=1e-15)
 
@@ -124,14 +130,14 @@ def test_the_pose_error_leads_to_the_target_in_a_second() -> None:
 def test_limits_keep_the_direction() -> None:
     for vector in RNG.normal(size=(50, 6)):
         for limited, size in (
-            (shortened(vector, 0.8), np.linalg.norm),
-            (slowed(vector, 0.8), peak),
+            (clip_norm(vector, 0.8), np.linalg.norm),
+            (scale_to_speed_limit(vector, 0.8), peak),
         ):
             assert size(limited) <= 0.8 * (1 + 1e-12)
             np.testing.assert_allclose(limited * (size(vector) / size(limited)), vector)
     small = np.array([0.1, -0.2])
-    assert shortened(small, 0.5) is small
-    assert slowed(small, 0.5) is small
+    assert clip_norm(small, 0.5) is small
+    assert scale_to_speed_limit(small, 0.5) is small
 
 
 def peak(vector: np.ndarray) -> float:
@@ -145,3 +151,33 @@ def test_manipulability_is_the_root_of_a_determinant(m: int, n: int, sigma: list
     np.testing.assert_allclose(found, sigma, rtol=1e-12)
     gram = j @ j.T if m <= n else j.T @ j
     assert product == pytest.approx(np.sqrt(np.linalg.det(gram)), rel=1e-10)
+
+
+def test_the_nearest_distance_of_a_planar_arm_in_closed_form() -> None:
+    """Links of 0.4 and 0.3 m on a slide of 0.3 m: a ring, extended up and down."""
+    arm = load("scara")
+    kinematics, model = ForwardKinematics(arm.model, arm.tip), arm.model
+    limits = model.lowerPositionLimit, model.upperPositionLimit
+    height = kinematics.at(arm.home).placement.translation[2]
+    top = height + limits[1][2] - arm.home[2]
+    starts = [arm.home, arm.home + np.array([0.5, -0.7, 0.0, 0.0])]
+    for target, wanted in (
+        ([2.0, 0.0, height], 1.3),
+        ([0.0, 0.7, height], 0.0),
+        ([0.5, 0.2, top + 0.4], 0.4),
+        ([1.0, 0.0, top + 0.4], 0.5),
+    ):
+        found = nearest_distance(kinematics, np.array(target), starts, *limits)
+        assert found == pytest.approx(wanted, abs=REACHED)
+
+
+@pytest.mark.parametrize("robot", ["ur5", "panda", "scara"])
+def test_no_place_a_posture_reaches_is_out_of_reach(robot: str) -> None:
+    arm, rng = load(robot), np.random.default_rng(5)
+    kinematics, model = ForwardKinematics(arm.model, arm.tip), arm.model
+    limits = model.lowerPositionLimit, model.upperPositionLimit
+    within = np.maximum(limits[0], -np.pi), np.minimum(limits[1], np.pi)
+    for q in rng.uniform(*within, (30, model.nq)):
+        place = kinematics.at(q).placement.translation
+        starts = [arm.home, *rng.uniform(*within, (5, model.nq))]
+        assert nearest_distance(kinematics, place, starts, *limits) <= REACHED

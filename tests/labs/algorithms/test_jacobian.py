@@ -9,13 +9,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from labs.algorithms.jacobian import (
-    SMALLEST_COS,
-    Chain,
-    Kinematics,
-    analytical,
-    geometric,
-    geometric_rate,
-    inverse_rate_matrix,
+    SMALLEST_COSINE,
+    ForwardKinematics,
+    PosedChain,
+    analytical_jacobian,
+    geometric_jacobian,
+    geometric_jacobian_rate,
+    inverse_rpy_rate_matrix,
 )
 from labs.algorithms.orientation import euler_axes, matrix_to_rpy, rpy_to_matrix
 from labs.models.arms import Arm, load
@@ -40,7 +40,7 @@ def velocities(arm: Arm) -> np.ndarray:
     return v
 
 
-def pose_of(kinematics: Kinematics, q: np.ndarray) -> np.ndarray:
+def pose_of(kinematics: ForwardKinematics, q: np.ndarray) -> np.ndarray:
     """phi (6,): position and roll-pitch-yaw, the latter by SciPy."""
     placement = kinematics.at(q).placement
     yaw, pitch, roll = Rotation.from_matrix(placement.rotation).as_euler("ZYX")
@@ -54,13 +54,13 @@ def test_geometric_is_pinocchios(arm: Arm) -> None:
     assert len(frames) >= 1 if arm.name == "double-pendulum" else len(frames) == 1 + arm.model.nv
     for q, frame in product(postures(arm), frames):
         expected = pin.computeFrameJacobian(arm.model, data, q, frame, WORLD)
-        found = geometric(Kinematics(arm.model, frame).at(q))
+        found = geometric_jacobian(ForwardKinematics(arm.model, frame).at(q))
         np.testing.assert_allclose(found, expected, atol=1e-14)
 
 
 def test_geometric_by_finite_differences(arm: Arm) -> None:
     """Position by differences; rotation by the log of what a small change of q_i turned."""
-    kinematics = Kinematics(arm.model, arm.tip)
+    kinematics = ForwardKinematics(arm.model, arm.tip)
     for q in postures(arm):
         columns = []
         for step in D * np.eye(arm.model.nv):
@@ -68,11 +68,11 @@ def test_geometric_by_finite_differences(arm: Arm) -> None:
             turn = Rotation.from_matrix(after.rotation @ before.rotation.T).as_rotvec()
             columns.append(np.concatenate([after.translation - before.translation, turn]))
         slope = np.array(columns).T / (2 * D)
-        np.testing.assert_allclose(geometric(kinematics.at(q)), slope, atol=1e-9)
+        np.testing.assert_allclose(geometric_jacobian(kinematics.at(q)), slope, atol=1e-9)
 
 
 def test_analytical_by_finite_differences(arm: Arm) -> None:
-    kinematics = Kinematics(arm.model, arm.tip)
+    kinematics = ForwardKinematics(arm.model, arm.tip)
     for q in postures(arm):
         slope = np.array(
             [
@@ -81,29 +81,33 @@ def test_analytical_by_finite_differences(arm: Arm) -> None:
             ]
         ).T / (2 * D)
         chain = kinematics.at(q)
-        found = analytical(chain, geometric(chain))
+        found = analytical_jacobian(chain, geometric_jacobian(chain))
         np.testing.assert_allclose(found, slope, rtol=1e-7, atol=2e-9)
-        np.testing.assert_array_equal(found[:3], geometric(chain)[:3])
+        np.testing.assert_array_equal(found[:3], geometric_jacobian(chain)[:3])
 
 
 def test_the_rate_of_the_jacobian_is_pinocchios_and_the_limit_of_differences(arm: Arm) -> None:
-    kinematics, data, v = Kinematics(arm.model, arm.tip), arm.model.createData(), velocities(arm)
+    kinematics, data, v = (
+        ForwardKinematics(arm.model, arm.tip),
+        arm.model.createData(),
+        velocities(arm),
+    )
     for q in postures(arm):
-        found = geometric_rate(kinematics.at(q), v)
+        found = geometric_jacobian_rate(kinematics.at(q), v)
         pin.computeJointJacobiansTimeVariation(arm.model, data, q, v)
         pin.updateFramePlacements(arm.model, data)
         expected = pin.getFrameJacobianTimeVariation(arm.model, data, arm.tip, WORLD)
         np.testing.assert_allclose(found, expected, atol=1e-13)
-        after, before = (geometric(kinematics.at(q + s * D * v)) for s in (1, -1))
+        after, before = (geometric_jacobian(kinematics.at(q + s * D * v)) for s in (1, -1))
         np.testing.assert_allclose(found, (after - before) / (2 * D), atol=3e-9)
 
 
 def test_a_joint_beyond_the_frame_does_not_move_it() -> None:
     arm = load("ur5")
-    chain = Kinematics(arm.model, arm.model.getFrameId("elbow_joint")).at(arm.home)
-    assert chain.carries.tolist() == [True, True, True, False, False, False]
+    chain = ForwardKinematics(arm.model, arm.model.getFrameId("elbow_joint")).at(arm.home)
+    assert chain.supports.tolist() == [True, True, True, False, False, False]
     v = velocities(arm)
-    for matrix in (geometric(chain), geometric_rate(chain, v)):
+    for matrix in (geometric_jacobian(chain), geometric_jacobian_rate(chain, v)):
         assert not matrix[:, 3:].any()
         assert matrix[:, :2].any()
 
@@ -115,8 +119,8 @@ def test_the_two_link_arm_in_closed_form() -> None:
     points = np.array([[0.0, 0.0, 0.0], [l1 * c1, l1 * s1, 0.0]])
     tip = pin.SE3(np.eye(3), points[1] + [l2 * c12, l2 * s12, 0.0])
     up = np.tile([0.0, 0.0, 1.0], (2, 1))
-    chain = Chain(up, points, np.zeros(2, bool), np.ones(2, bool), tip)
-    jacobian = geometric(chain)
+    chain = PosedChain(up, points, np.zeros(2, bool), np.ones(2, bool), tip)
+    jacobian = geometric_jacobian(chain)
     expected = [[-l1 * s1 - l2 * s12, -l2 * s12], [l1 * c1 + l2 * c12, l2 * c12]]
     np.testing.assert_allclose(jacobian[:2], expected, atol=1e-15)
     np.testing.assert_array_equal(jacobian[2:], [[0, 0], [0, 0], [0, 0], [1, 1]])
@@ -124,7 +128,7 @@ def test_the_two_link_arm_in_closed_form() -> None:
     w = v.sum()
     slope = [[-l1 * c1 * v[0] - l2 * c12 * w, -l2 * c12 * w]]
     slope += [[-l1 * s1 * v[0] - l2 * s12 * w, -l2 * s12 * w]]
-    rate = geometric_rate(chain, v)
+    rate = geometric_jacobian_rate(chain, v)
     np.testing.assert_allclose(rate[:2], slope, atol=1e-15)
     assert not rate[2:].any()
 
@@ -132,11 +136,11 @@ def test_the_two_link_arm_in_closed_form() -> None:
 def test_the_scara_is_a_two_link_arm_on_a_slide() -> None:
     arm = load("scara")
     q = np.array([0.3, 1.1, 0.07, -0.4])
-    chain = Kinematics(arm.model, arm.tip).at(q)
+    chain = ForwardKinematics(arm.model, arm.tip).at(q)
     c1, c12, s1, s12 = np.cos(0.3), np.cos(1.4), np.sin(0.3), np.sin(1.4)
     place = [0.4 * c1 + 0.3 * c12, 0.4 * s1 + 0.3 * s12, 0.28 + 0.07]
     np.testing.assert_allclose(chain.placement.translation, place, atol=1e-15)
-    jacobian = geometric(chain)
+    jacobian = geometric_jacobian(chain)
     assert chain.prismatic.tolist() == [False, False, True, False]
     np.testing.assert_array_equal(jacobian[:, 2], [0, 0, 1, 0, 0, 0])
     np.testing.assert_allclose(jacobian[:, 3], [0, 0, 0, 0, 0, 1], atol=1e-15)
@@ -153,9 +157,9 @@ def test_a_joint_that_slides_is_carried_around_by_those_before_it() -> None:
     last = model.addJoint(slide, pin.JointModelRY(), offset, "last")
     frame = model.addFrame(pin.Frame("tip", last, offset, pin.FrameType.OP_FRAME))
     q, v = np.array([0.4, 0.25, -0.7]), np.array([1.3, -0.6, 0.9])
-    kinematics = Kinematics(model, frame)
-    after, before = (geometric(kinematics.at(q + s * D * v)) for s in (1, -1))
-    found = geometric_rate(kinematics.at(q), v)
+    kinematics = ForwardKinematics(model, frame)
+    after, before = (geometric_jacobian(kinematics.at(q + s * D * v)) for s in (1, -1))
+    found = geometric_jacobian_rate(kinematics.at(q), v)
     np.testing.assert_allclose(found, (after - before) / (2 * D), atol=1e-9)
     np.testing.assert_allclose(found[:3, 1], 1.3 * np.array([-np.sin(0.4), np.cos(0.4), 0]))
 
@@ -165,7 +169,7 @@ def test_the_inverse_rate_matrix_against_pinocchio_and_the_axes_of_the_angles() 
         expected = pin.rpy.computeRpyJacobian(angles, WORLD)
         axes = euler_axes("zyx", angles[::-1])[:, ::-1]
         np.testing.assert_allclose(axes, expected, atol=1e-15)
-        inverse = inverse_rate_matrix(angles)
+        inverse = inverse_rpy_rate_matrix(angles)
         np.testing.assert_allclose(inverse @ axes, np.eye(3), atol=1e-11)
         assert np.linalg.det(axes) == pytest.approx(np.cos(angles[1]), abs=1e-14)
         worst = 1 / np.sqrt(1 - abs(np.sin(angles[1])))
@@ -182,16 +186,16 @@ def test_at_the_lock_the_analytical_jacobian_belongs_to_the_angles_of_the_rotati
     angles = matrix_to_rpy(rotation)
     np.testing.assert_allclose(rpy_to_matrix(angles), rotation, atol=1e-15)
     arm = load("ur5")
-    chain = Kinematics(arm.model, arm.tip).at(arm.home)
+    chain = ForwardKinematics(arm.model, arm.tip).at(arm.home)
     chain = replace(chain, placement=pin.SE3(rotation, chain.placement.translation))
-    jacobian = geometric(chain)
-    found = analytical(chain, jacobian)[3:]
-    np.testing.assert_array_equal(found, inverse_rate_matrix(angles) @ jacobian[3:])
+    jacobian = geometric_jacobian(chain)
+    found = analytical_jacobian(chain, jacobian)[3:]
+    np.testing.assert_array_equal(found, inverse_rpy_rate_matrix(angles) @ jacobian[3:])
     assert np.isfinite(found).all()
 
 
 @pytest.mark.parametrize("theta", [np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-9])
 def test_the_inverse_rate_stays_finite_where_there_is_none(theta: float) -> None:
-    inverse = inverse_rate_matrix(np.array([0.3, theta, 0.2]))
+    inverse = inverse_rpy_rate_matrix(np.array([0.3, theta, 0.2]))
     assert np.isfinite(inverse).all()
-    assert np.abs(inverse).max() == pytest.approx(np.cos(0.2) / SMALLEST_COS)
+    assert np.abs(inverse).max() == pytest.approx(np.cos(0.2) / SMALLEST_COSINE)

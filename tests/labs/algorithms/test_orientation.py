@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from labs.algorithms.orientation import (
     SEQUENCES,
-    about,
     angle_axis_to_matrix,
     angle_axis_to_quaternion,
+    elementary_rotation,
     euler_axes,
     euler_rates,
     euler_to_matrix,
@@ -50,7 +50,7 @@ def test_all_twelve_sequences_are_there() -> None:
 @pytest.mark.parametrize("axis", "xyz")
 def test_a_turn_about_an_axis(axis: str) -> None:
     wanted = Rotation.from_euler(axis, 0.7).as_matrix()
-    np.testing.assert_allclose(about(axis, 0.7), wanted, atol=1e-15)
+    np.testing.assert_allclose(elementary_rotation(axis, 0.7), wanted, atol=1e-15)
 
 
 @every_sequence

@@ -11,19 +11,19 @@ from labs.algorithms.runge_kutta import (
     MIDPOINT,
     RK4,
     TABLEAUS,
-    Flow,
     Tableau,
+    VectorField,
     gauss_legendre,
-    integrate,
     order,
     order_conditions,
-    parse,
-    step,
+    parse_tableau,
+    runge_kutta_integrate,
+    runge_kutta_step,
 )
 from labs.errors import LabError
 
-RALSTON = parse("0 |\n1/3 | 1/3\n2/3 | 0 2/3\n| 1/4 0 3/4")
-LOBATTO = parse("0 |; 1/2 | 5/24 1/3 -1/24; 1 | 1/6 2/3 1/6; | 1/6 2/3 1/6")
+RALSTON = parse_tableau("0 |\n1/3 | 1/3\n2/3 | 0 2/3\n| 1/4 0 3/4")
+LOBATTO = parse_tableau("0 |; 1/2 | 5/24 1/3 -1/24; 1 | 1/6 2/3 1/6; | 1/6 2/3 1/6")
 ORDERS = {
     "euler": 1,
     "midpoint": 2,
@@ -56,7 +56,7 @@ def jacobian(x: np.ndarray, t: float) -> np.ndarray:
     )
 
 
-FLOW = Flow(f, jacobian)
+FLOW = VectorField(f, jacobian)
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +76,8 @@ def test_every_named_method_is_measured() -> None:
 def test_the_measured_order_is_the_stated_one(tableau: Tableau, p: int, exact: np.ndarray) -> None:
     n = 40 if p == 4 else 160
     coarse, fine = (
-        np.linalg.norm(integrate(tableau, FLOW, X0, 1.0 / k, k)[0] - exact) for k in (n, 2 * n)
+        np.linalg.norm(runge_kutta_integrate(tableau, FLOW, X0, 1.0 / k, k)[0] - exact)
+        for k in (n, 2 * n)
     )
     assert np.log2(coarse / fine) == pytest.approx(p, abs=0.1)
     assert order(tableau) == p
@@ -84,7 +85,7 @@ def test_the_measured_order_is_the_stated_one(tableau: Tableau, p: int, exact: n
 
 def test_gauss_legendre_of_three_stages_has_order_six(exact: np.ndarray) -> None:
     coarse, fine = (
-        np.linalg.norm(integrate(gauss_legendre(3), FLOW, X0, 1.0 / k, k)[0] - exact)
+        np.linalg.norm(runge_kutta_integrate(gauss_legendre(3), FLOW, X0, 1.0 / k, k)[0] - exact)
         for k in (8, 16)
     )
     assert np.log2(coarse / fine) == pytest.approx(6, abs=0.2)
@@ -115,9 +116,9 @@ def test_conditions_are_the_taylor_coefficients_of_trees() -> None:
     ]
     wanted = [1, 1 / 2, 1 / 3, 1 / 6, 1 / 4, 1 / 8, 1 / 12, 1 / 24]
     np.testing.assert_allclose(order_conditions(t), np.subtract(found, wanted), atol=1e-15)
-    assert order(parse("0 | ; 1/2 | 1/2; 1/2 | 0 1/2; 1 | 0 0 1; | 1/6 1/3 1/3 1/5")) == 0
-    assert order(parse("0 | ; 1/2 | 1/2; | 1/2 1/2")) == 1
-    assert order(parse("0 | ; 1/2 | 1/2; 1 | -1 2; | 1 -1 1")) == 2  # a negative weight
+    assert order(parse_tableau("0 | ; 1/2 | 1/2; 1/2 | 0 1/2; 1 | 0 0 1; | 1/6 1/3 1/3 1/5")) == 0
+    assert order(parse_tableau("0 | ; 1/2 | 1/2; | 1/2 1/2")) == 1
+    assert order(parse_tableau("0 | ; 1/2 | 1/2; 1 | -1 2; | 1 -1 1")) == 2  # a negative weight
 
 
 @pytest.mark.parametrize(
@@ -131,9 +132,11 @@ def test_the_integrators_of_mechanisms_do_the_same(name: str, tableau: Tableau) 
         value: np.ndarray = np.sin(q[::-1]) - 0.2 * v * q
         return value
 
-    flow = Flow(lambda x, t: np.concatenate([x[3:], a(x[:3], x[3:])]), lambda x, t: np.eye(6))
+    field = VectorField(
+        lambda x, t: np.concatenate([x[3:], a(x[:3], x[3:])]), lambda x, t: np.eye(6)
+    )
     wanted = np.concatenate(INTEGRATORS[name].step(a, q, v, 0.1))
-    found = step(tableau, flow, np.concatenate([q, v]), 0.0, 0.1)
+    found = runge_kutta_step(tableau, field, np.concatenate([q, v]), 0.0, 0.1)
     np.testing.assert_allclose(found.x, wanted, rtol=0, atol=1e-15)
     assert found.evaluations == tableau.stages
 
@@ -151,7 +154,7 @@ def test_newton_finds_the_stages_scipy_finds(tableau: Tableau) -> None:
         return np.ravel([k[i] - f(points[i], t + h * tableau.c[i]) for i in range(q)])
 
     k = root(defect, np.tile(f(X0, t), q), tol=1e-13).x.reshape(q, n)
-    done = step(tableau, FLOW, X0, t, h)
+    done = runge_kutta_step(tableau, FLOW, X0, t, h)
     np.testing.assert_allclose(done.x, X0 + h * tableau.b @ k, atol=1e-11)
     assert done.status == ""
     assert done.residual < 1e-11
@@ -160,7 +163,9 @@ def test_newton_finds_the_stages_scipy_finds(tableau: Tableau) -> None:
 def test_newton_needs_one_iteration_where_the_motion_is_linear() -> None:
     m = np.array([[0.0, 1.0], [-9.0, -0.5]])
     x, h = np.array([1.0, 2.0]), 0.3
-    done = step(gauss_legendre(1), Flow(lambda x, t: m @ x, lambda x, t: m), x, 0.0, h)
+    done = runge_kutta_step(
+        gauss_legendre(1), VectorField(lambda x, t: m @ x, lambda x, t: m), x, 0.0, h
+    )
     eye = np.eye(2)
     np.testing.assert_allclose(
         done.x, np.linalg.solve(eye - h / 2 * m, (eye + h / 2 * m) @ x), atol=1e-14
@@ -171,29 +176,33 @@ def test_newton_needs_one_iteration_where_the_motion_is_linear() -> None:
 
 def test_newton_converges_quadratically() -> None:
     """With a wrong Jacobian it needs many more steps: the derivatives are what makes it fast."""
-    right = step(gauss_legendre(2), FLOW, X0, 0.0, 0.4)
-    wrong = step(gauss_legendre(2), Flow(f, lambda x, t: 0.0 * jacobian(x, t)), X0, 0.0, 0.4)
+    right = runge_kutta_step(gauss_legendre(2), FLOW, X0, 0.0, 0.4)
+    wrong = runge_kutta_step(
+        gauss_legendre(2), VectorField(f, lambda x, t: 0.0 * jacobian(x, t)), X0, 0.0, 0.4
+    )
     assert right.iterations <= 5
     assert wrong.iterations >= 3 * right.iterations
 
 
 def test_a_newton_that_fails_says_so() -> None:
-    flow = Flow(lambda x, t: x**2 + 1.0, lambda x, t: np.diag(2.0 * x))
-    done = step(TABLEAUS["implicit-euler"], flow, np.array([1.0]), 0.0, 2.0)
+    field = VectorField(lambda x, t: x**2 + 1.0, lambda x, t: np.diag(2.0 * x))
+    done = runge_kutta_step(TABLEAUS["implicit-euler"], field, np.array([1.0]), 0.0, 2.0)
     assert done.status.startswith("Newton's method found no stages in ")
     assert done.residual > 0.1
-    assert np.isnan(integrate(TABLEAUS["implicit-euler"], flow, np.array([1.0]), 2.0, 3)[0]).all()
+    assert np.isnan(
+        runge_kutta_integrate(TABLEAUS["implicit-euler"], field, np.array([1.0]), 2.0, 3)[0]
+    ).all()
 
 
 def test_the_implicit_midpoint_rule_conserves_a_quadratic_energy() -> None:
-    flow = Flow(
+    field = VectorField(
         lambda x, t: np.array([x[1], -x[0]]), lambda x, t: np.array([[0.0, 1.0], [-1.0, 0.0]])
     )
     x = np.array([1.0, 0.0])
     for tableau in (gauss_legendre(1), gauss_legendre(2)):
-        end, _ = integrate(tableau, flow, x, 0.5, 1000)
+        end, _ = runge_kutta_integrate(tableau, field, x, 0.5, 1000)
         assert end @ end == pytest.approx(1.0, abs=1e-11)
-    end, _ = integrate(RK4, flow, x, 0.5, 1000)
+    end, _ = runge_kutta_integrate(RK4, field, x, 0.5, 1000)
     assert end @ end == pytest.approx((1 - 0.5**6 / 72 + 0.5**8 / 576) ** 1000, rel=1e-10)
 
 
@@ -202,7 +211,7 @@ def test_the_implicit_midpoint_rule_conserves_a_quadratic_energy() -> None:
 
 def test_a_tableau_is_read_as_it_is_written() -> None:
     for text in ("0 |\n1/2 | .5\n\n | 0 1", " 0|;0.5|1/2 0;|0 1e0"):
-        tableau = parse(text)
+        tableau = parse_tableau(text)
         np.testing.assert_array_equal(tableau.a, MIDPOINT.a)
         np.testing.assert_array_equal(tableau.b, MIDPOINT.b)
         np.testing.assert_array_equal(tableau.c, MIDPOINT.c)
@@ -231,5 +240,5 @@ def test_a_tableau_is_read_as_it_is_written() -> None:
 )
 def test_what_is_no_tableau_is_refused_by_row(text: str, sentence: str) -> None:
     with pytest.raises(LabError) as refusal:
-        parse(text)
+        parse_tableau(text)
     assert sentence in str(refusal.value)

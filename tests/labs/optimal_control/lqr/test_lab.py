@@ -180,3 +180,17 @@ def test_without_a_policy_the_page_still_draws() -> None:
     scene = NullScene()
     LAB.draw(scene, params, state)
     assert "system" in scene.names
+
+
+def test_a_pendulum_pushed_past_a_full_turn_is_wound_back() -> None:
+    """As the article says: a linear policy knows q, not q modulo 2 pi."""
+    params = LqrParams(system="pendulum", deviation=0.0, limit=4.0, push_force=200.0)
+    state = LAB.init(params, np.random.default_rng(0))
+    turned = []
+    for k in range(800):
+        pushed = Inputs(("push",)) if k == 0 else Inputs()
+        state = LAB.step(params, pushed, state)
+        turned.append(float((state.x - params.linear_system.x_eq)[0]))
+    assert not state.trouble
+    assert 1.8 * 2 * np.pi < max(turned) < 2 * 2 * np.pi
+    assert abs(turned[-1]) < 1e-3

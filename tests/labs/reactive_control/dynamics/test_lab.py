@@ -10,16 +10,12 @@ from scipy.integrate import solve_ivp
 
 from labs.lab import Inputs
 from labs.models.plant import plant
-from labs.models.postures import ROBOTS
 from labs.params import Value
-from labs.reactive_control.dynamics.lab import (
-    FASTEST,
-    Dynamics,
-    DynamicsParams,
-    DynamicsState,
-    _world,
-)
+from labs.reactive_control.dynamics.equation import plant_under_gravity
+from labs.reactive_control.dynamics.lab import SPEED_LIMIT, Dynamics, DynamicsState
+from labs.reactive_control.dynamics.params import DynamicsParams
 from labs.scene import NullScene
+from labs.tasks.arm.postures import POSED_ARMS
 from tests.labs.experiments import Experiments
 
 LAB = Dynamics()
@@ -143,13 +139,15 @@ def test_a_free_fall_keeps_its_energy(setting: Mapping[str, Value]) -> None:
 
 @ARTICLE.verify("A careless integrator makes energy")
 def test_a_careless_integrator_makes_energy(setting: Mapping[str, Value]) -> None:
-    gained = last(with_(setting), 5.0).gained
+    gained = last(with_(setting), 5.0).energy_drift
     set_free = rows(with_(FALL), 5.0)["kinetic"].max()
     assert 9.0 < gained < 0.5 * set_free
-    half = last(with_(setting, step=0.002), 5.0).gained
+    half = last(with_(setting, step=0.002), 5.0).energy_drift
     assert half / gained == pytest.approx(2 / 5, abs=0.05)
-    assert last(with_(setting, integrator="midpoint"), 5.0).gained == pytest.approx(0.01, abs=2e-3)
-    runge = last(with_(setting, integrator="rk4"), 5.0).gained
+    assert last(with_(setting, integrator="midpoint"), 5.0).energy_drift == pytest.approx(
+        0.01, abs=2e-3
+    )
+    runge = last(with_(setting, integrator="rk4"), 5.0).energy_drift
     assert abs(runge) == pytest.approx(0.00006, abs=1e-5)
 
 
@@ -160,7 +158,7 @@ def test_every_experiment_is_verified_here() -> None:
 # The world's laws
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", POSED_ARMS)
 @pytest.mark.parametrize("drive", ["balanced", "inverse", "none"])
 def test_the_equation_holds_at_every_instant(robot: str, drive: str) -> None:
     params = with_(
@@ -174,7 +172,7 @@ def test_the_equation_holds_at_every_instant(robot: str, drive: str) -> None:
     assert run["least_inertia"].min() > 0.0
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", POSED_ARMS)
 @pytest.mark.parametrize("drive", ["balanced", "inverse", "none"])
 def test_energy_changes_by_the_power_put_in(robot: str, drive: str) -> None:
     """dE/dt = tau . q' + w . v, by differences of order 4. (The torque is held for half a
@@ -191,7 +189,7 @@ def test_energy_changes_by_the_power_put_in(robot: str, drive: str) -> None:
     assert np.abs(run["drift"]).max() < 1e-7
 
 
-def test_the_book_of_energy_survives_what_changes_on_the_way() -> None:
+def test_the_balance_of_energy_survives_what_changes_on_the_way() -> None:
     """Gravity off, a payload on, in mid-flight: neither is an error of the integrator."""
     params = with_(FALL)
     state = last(params, 0.5)
@@ -199,7 +197,7 @@ def test_the_book_of_energy_survives_what_changes_on_the_way() -> None:
         params = params.change(change)
         for _ in range(30):
             state = LAB.step(params, Inputs(), state)
-    assert abs(state.gained) < 1e-6
+    assert abs(state.energy_drift) < 1e-6
 
 
 @pytest.mark.parametrize(
@@ -208,18 +206,18 @@ def test_the_book_of_energy_survives_what_changes_on_the_way() -> None:
 )
 def test_energy_drifts_with_the_order_of_the_method(integrator: str, order: int) -> None:
     fine, coarse = (
-        last(with_(FALL, integrator=integrator, step=h, q2=0.5, speed=1.0), 0.4).gained
+        last(with_(FALL, integrator=integrator, step=h, q2=0.5, speed=1.0), 0.4).energy_drift
         for h in (0.001, 0.002)
     )
     assert abs(fine) > 1e-10
     assert np.log2(coarse / fine) == pytest.approx(order, abs=0.05)
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", POSED_ARMS)
 def test_it_falls_as_scipy_says(robot: str) -> None:
     """The same equation, solved from its matrices by an adaptive method of order 8."""
     params = with_({"robot": robot, "drive": "none", "payload": 1.0, "fy": 5.0, "tau1": 2.0})
-    world = _world(robot, 1.0, True)
+    world = plant_under_gravity(robot, 1.0, True)
     n = world.model.nv
     tau = params.torques(n)
 
@@ -237,13 +235,13 @@ def test_it_falls_as_scipy_says(robot: str) -> None:
 
 
 def test_balanced_it_stays() -> None:
-    for robot in ROBOTS:
+    for robot in POSED_ARMS:
         params = with_({"robot": robot, "drive": "balanced", "payload": 3.0})
         state = last(params, 1.0)
         np.testing.assert_allclose(state.q, params.start, atol=1e-12)
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", POSED_ARMS)
 def test_inverse_dynamics_moves_it_as_asked(robot: str) -> None:
     """q = q(0) + a (T / 2 pi)^2 (1 - cos(2 pi t / T)), against an external force too, as the
     time the torque is held goes to zero: half of it, half the error."""
@@ -277,7 +275,7 @@ def test_the_torque_asked_for_holds_against_the_force() -> None:
     np.testing.assert_array_equal(row["bias"][:, 2], row["bias"][:, 0] + row["bias"][:, 1])
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", POSED_ARMS)
 def test_damping_takes_the_kinetic_energy(robot: str) -> None:
     """Balanced against gravity, d/dt of (q' M q' / 2) = -b |q'|^2."""
     run = rows(
@@ -295,7 +293,7 @@ def test_it_stops_before_numbers_mean_nothing() -> None:
     params = with_({"robot": "double-pendulum", "drive": "balanced", "tau2": 30.0})
     *_, sane, stopped = states(params, 20.0)
     assert "t = " in stopped.trouble
-    assert np.linalg.norm(stopped.v) <= FASTEST
+    assert np.linalg.norm(stopped.v) <= SPEED_LIMIT
     np.testing.assert_array_equal(sane.q, stopped.q)
     assert LAB.step(params, Inputs(), stopped) is stopped
 

@@ -1,232 +1,35 @@
-"""The lab joint-control: what its article claims, in numbers, and what its world must obey."""
+"""The lab joint-control: what its world must obey, and what it keeps and measures."""
 
 import copy
-import re
-import tomllib
 from collections.abc import Iterator, Mapping
-from importlib.resources import files
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pinocchio as pin
 import pytest
-from scipy.linalg import expm
 
 from labs.lab import Inputs
 from labs.models.plant import plant
 from labs.params import Choice, Knob, Toggle, Value
-from labs.plots import measured, pictured
-from labs.reactive_control.joint_control.lab import (
-    PUSH_STEPS,
-    SPRING,
-    STRONGEST_PULL,
-    VELOCITY_NOISE,
-    JointControl,
-    JointParams,
-    JointState,
-)
-from labs.reactive_control.joint_control.sampled_stability import Robot
+from labs.reactive_control.joint_control.lab import JointState
+from labs.reactive_control.joint_control.params import JointParams
 from labs.scene import NullScene
-
-LAB = JointControl()
-ARTICLE = files("labs.reactive_control").joinpath("joint_control.md").read_text(encoding="utf-8")
-EXPERIMENTS: Mapping[str, Mapping[str, Value]] = {
-    block["title"]: block["set"]
-    for block in map(tomllib.loads, re.findall(r"```experiment\n(.*?)```", ARTICLE, re.DOTALL))
-}
-VERIFIED: set[str] = set()
-PUSHED = Inputs(actions=("push",))
-
-
-def experiment(title: str) -> pytest.MarkDecorator:
-    """Marks the test that verifies this experiment and gives it the experiment's settings."""
-    VERIFIED.add(title)
-    return pytest.mark.parametrize("setting", [EXPERIMENTS[title]], ids=[title])
-
-
-def with_(setting: Mapping[str, Value], **changes: Value) -> JointParams:
-    return JointParams().change({**setting, **changes})
-
-
-def states(
-    params: JointParams, seconds: float, inputs: Mapping[int, Inputs] | None = None, seed: int = 0
-) -> Iterator[JointState]:
-    """The states from t = 0 on, until trouble."""
-    state = LAB.init(params, np.random.default_rng(seed))
-    yield state
-    for k in range(round(seconds / LAB.period)):
-        state = LAB.step(params, (inputs or {}).get(k, Inputs()), state)
-        yield state
-        if state.trouble:
-            return
-
-
-def last(
-    params: JointParams, seconds: float, inputs: Mapping[int, Inputs] | None = None
-) -> JointState:
-    *_, state = states(params, seconds, inputs)
-    return state
-
-
-def error(state: JointState) -> np.ndarray:
-    e: np.ndarray = state.q_ref - state.q
-    return e
-
-
-def gravity(params: JointParams, q: np.ndarray) -> np.ndarray:
-    """g(q) of the controller's model."""
-    known = plant(params.robot)
-    torque: np.ndarray = pin.computeGeneralizedGravity(known.model, known.data, q).copy()
-    return torque
-
-
-# The experiments
-
-
-@experiment("Open loop drifts")
-def test_open_loop_drifts(setting: Mapping[str, Value]) -> None:
-    params = with_(setting)
-    path = list(states(params, 2.0))
-    world = plant("ur5")
-    a, _ = Robot.near(world.model, world.data, path[0].q_ref, 0.0).dynamics()
-    assert np.linalg.eigvals(a).real.max() == pytest.approx(4.46, abs=0.005)
-    for k in (10, 20):
-        start = np.concatenate([error(path[0]), np.zeros(6)])
-        predicted = (expm(0.01 * k * a) @ start)[:6]
-        np.testing.assert_allclose(error(path[k]), predicted, atol=0.0015)
-    assert np.abs(error(path[-1])).max() > 1.0
-    exact = last(with_(setting, initial_error=0.0), 1.0)
-    assert np.abs(error(exact)).max() < 1e-9
-
-
-@experiment("PD alone sags")
-def test_pd_sags_by_what_gravity_asks(setting: Mapping[str, Value]) -> None:
-    params = with_(setting)
-    rest = last(params, 10.0)
-    weight = gravity(params, rest.q)
-    np.testing.assert_allclose(params.kp * error(rest), weight, rtol=1e-3, atol=1e-3)
-    assert error(rest)[1:3] == pytest.approx([-0.158, -0.049], abs=6e-4)
-    assert gravity(params, rest.q_ref)[1] == pytest.approx(-28, abs=0.5)
-    assert weight[1] == pytest.approx(-31.7, abs=0.05)
-    stiffer = error(last(with_(setting, kp=400.0), 10.0))
-    assert stiffer[1] == pytest.approx(error(rest)[1] / 2, rel=0.1)
-
-
-@experiment("The integral removes the sag")
-def test_the_integral_removes_the_sag(setting: Mapping[str, Value]) -> None:
-    params = with_(setting)
-    rest = last(params, 20.0)
-    assert np.abs(error(rest)).max() < 1e-6
-    np.testing.assert_allclose(rest.torque, gravity(params, rest.q_ref), atol=1e-4)
-    np.testing.assert_allclose(params.ki * rest.integral, rest.torque, atol=1e-3)
-
-
-@experiment("Too much integral oscillates")
-def test_too_much_integral_oscillates(setting: Mapping[str, Value]) -> None:
-    params = with_(setting)
-    path = list(states(params, 20.0))
-    swings = np.array([error(s)[1] for s in path])
-    early, late = swings[500:1000], swings[1500:]
-    assert np.abs(late).max() > 1.3 * np.abs(early).max()
-    fields = LAB.fields(params, path[0])
-    rightmost = np.argmax(fields["poles_re"])
-    assert fields["poles_re"][rightmost] > 0.0
-    crossings = np.flatnonzero(np.diff(np.sign(late)) > 0) * LAB.period
-    expected = 2 * np.pi / abs(fields["poles_im"][rightmost])
-    assert np.diff(crossings).mean() == pytest.approx(expected, rel=0.05)
-    assert np.abs(error(last(with_(setting, kd=60.0), 20.0))).max() < 1e-6
-
-
-@experiment("Gravity compensation needs no integral")
-def test_gravity_compensation_needs_no_integral(setting: Mapping[str, Value]) -> None:
-    params = with_(setting)
-    rest = last(params, 5.0)
-    assert np.abs(error(rest)).max() < 1e-6
-    np.testing.assert_allclose(rest.torque, gravity(params, rest.q_ref), atol=1e-4)
-    assert not rest.integral.any()
-    settled = LAB.measure(params, rest)["settling_time"]
-    assert isinstance(settled, float)
-    assert 0.3 < settled < 1.0
-
-
-@experiment("An unknown payload brings the sag back")
-def test_an_unknown_payload_brings_the_sag_back(setting: Mapping[str, Value]) -> None:
-    params = with_(setting)
-    rest = last(params, 10.0)
-    missing = plant("ur5").tip_jacobian(rest.q).T @ np.array([0.0, 0.0, 5.0 * 9.81])
-    np.testing.assert_allclose(params.kp * error(rest), missing, rtol=1e-3, atol=1e-3)
-    assert error(rest)[1] == pytest.approx(-0.105, abs=5e-4)
-
-
-@experiment("Floating")
-def test_a_floating_arm_stays_where_it_stops(setting: Mapping[str, Value]) -> None:
-    params = with_(setting)
-    still = last(params, 2.0)
-    assert np.abs(still.v).max() < 1e-9
-    path = list(states(params, 20.0, {100: PUSHED}))
-    assert np.abs(error(path[-1])).max() > 0.3
-    assert np.abs(path[-1].v).max() < 1e-3
-    np.testing.assert_allclose(path[-1].q, path[-200].q, atol=2e-3)
-    held = last(with_(setting, kp=200.0), 20.0, {100: PUSHED})
-    assert np.abs(error(held)).max() < 1e-3
-
-
-@experiment("Computed torque makes joints alike")
-def test_computed_torque_makes_every_joint_alike(setting: Mapping[str, Value]) -> None:
-    for k, state in enumerate(states(with_(setting), 1.5)):
-        t = k * LAB.period
-        expected = -0.3 * (1 + 10 * t) * np.exp(-10 * t)
-        np.testing.assert_allclose(error(state), expected, atol=2e-3)
-        assert np.ptp(error(state)) < 1e-5
-    loaded = [np.ptp(error(s)) for s in states(with_(setting, payload=5.0), 1.5)]
-    assert max(loaded) > 0.02
-
-
-@experiment("Explicit Euler without damping")
-def test_explicit_euler_without_damping_gains_energy(setting: Mapping[str, Value]) -> None:
-    params = with_(setting)
-    *path, stopped = states(params, 10.0)
-    assert 2.0 < stopped.t < 3.0
-    assert "integrator and its step are at fault" in stopped.trouble
-    assert params.kp * params.step == pytest.approx(0.2)
-    assert "k_d of at least 0.2" in stopped.trouble
-    assert sum(plant("ur5").energy(path[-1].q, path[-1].v)) > 10 + sum(
-        plant("ur5").energy(path[0].q, path[0].v)
-    )
-    swinging = list(states(with_(setting, integrator="semi-implicit-euler"), 10.0))
-    assert not swinging[-1].trouble
-    assert max(np.abs(error(s)).max() for s in swinging) < 0.2
-    assert max(np.abs(error(s)).max() for s in swinging[-100:]) > 0.05
-    damped = last(with_(setting, kd=0.4), 20.0)
-    assert np.abs(error(damped)).max() < 0.1
-
-
-@experiment("A slow controller chatters")
-def test_a_slow_controller_chatters(setting: Mapping[str, Value]) -> None:
-    params = with_(setting)
-    path = list(states(params, 5.0))
-    limit = plant("ur5").arm.torque_limit
-    saturated = np.mean([np.abs(s.torque) >= limit for s in path[100:]], axis=0)
-    assert saturated[5] > 0.9
-    assert not saturated[:3].any()
-    stopped = last(with_(setting, torque_limits=False), 1.0)
-    assert stopped.t < 0.1
-    assert "The control period is at fault" in stopped.trouble
-    calm = last(with_(setting, kd=5.0), 20.0)
-    assert np.abs(error(calm)).max() < 1e-5
-
-
-def test_every_experiment_is_verified_here() -> None:
-    assert set(EXPERIMENTS) == VERIFIED
-    assert len(EXPERIMENTS) >= 6
-
+from tests.labs.reactive_control.joint_control.runs import (
+    ARTICLE,
+    LAB,
+    PUSHED,
+    error,
+    final_state,
+    parameters,
+    states,
+)
 
 # The world's laws
 
 
 def test_it_starts_as_asked() -> None:
-    params = with_({}, initial_error=-0.2, amplitude=0.4, frequency=0.5)
+    params = parameters({}, initial_error=-0.2, amplitude=0.4, frequency=0.5)
     state = LAB.init(params, np.random.default_rng(0))
     home = plant("ur5").arm.home
     np.testing.assert_allclose(state.q, home - 0.2, atol=1e-15)
@@ -248,17 +51,17 @@ def test_without_torque_energy_stays() -> None:
         "step": 0.0005,
     }
     for robot in ("ur5", "double-pendulum"):
-        params = with_(free, robot=robot, payload=1.0)
+        params = parameters(free, robot=robot, payload=1.0)
         energies = totals(params)
         np.testing.assert_allclose(energies, energies[0], atol=1e-5)
-        losing = with_(free, robot=robot, friction=0.5)
+        losing = parameters(free, robot=robot, friction=0.5)
         assert np.all(np.diff(totals(losing)) < 0.0)
 
 
 @pytest.mark.parametrize("robot", ["ur5", "panda", "double-pendulum"])
 def test_energy_changes_by_the_work_done(robot: str) -> None:
     """With the torque held over whole world steps its work is tau dq, and a push's is f dx."""
-    params = with_(
+    params = parameters(
         {"control_period": 0.01, "integrator": "rk4", "step": 0.0005, "kd": 5.0},
         robot=robot,
         payload=2.0,
@@ -275,34 +78,6 @@ def test_energy_changes_by_the_work_done(robot: str) -> None:
         assert gained == pytest.approx(work, abs=2e-7)
 
 
-def test_a_push_is_an_impulse() -> None:
-    """From rest and compensated, M v = J' f 0.2 s for a small force."""
-    params = with_(
-        {"reference": "set-point", "kp": 0.0, "kd": 0.0, "push_force": 0.1, "amplitude": 0.0},
-        push_direction="-z",
-    )
-    path = list(states(params, 0.5, {5: PUSHED}))
-    forces = [LAB.measure(params, s)["force"] for s in path]
-    assert forces == [0.1 if 5 < k <= 5 + PUSH_STEPS else 0.0 for k in range(len(path))]
-    world = plant("ur5")
-    mass = Robot.near(world.model, world.data, path[0].q, 0.0).mass
-    impulse = world.tip_jacobian(path[0].q).T @ np.array([0.0, 0.0, -0.1 * 0.2])
-    np.testing.assert_allclose(path[26].v, np.linalg.solve(mass, impulse), rtol=2e-3, atol=1e-5)
-
-
-def test_the_handle_pulls_like_a_spring() -> None:
-    params = with_({}, reference="set-point", amplitude=0.0)
-    start = LAB.init(params, np.random.default_rng(0))
-    tip = plant("ur5").tip(start.q)
-    for offset, size in (([0.0, 0.1, 0.0], 0.1 * SPRING), ([0.0, 5.0, 0.0], STRONGEST_PULL)):
-        pulling = Inputs(handles={"pull": tuple(tip + offset)})
-        state = LAB.step(params, pulling, start)
-        assert float(np.linalg.norm(state.force)) == pytest.approx(size, rel=0.02)
-        path = list(states(params, 1.0, dict.fromkeys(range(100), pulling)))
-        assert plant("ur5").tip(path[-1].q)[1] > tip[1] + 0.01
-        assert not LAB.step(params, Inputs(), state).force.any()
-
-
 @pytest.mark.parametrize("robot", ["ur5", "panda", "double-pendulum"])
 def test_torque_stays_within_its_limits(robot: str) -> None:
     setting: dict[str, Value] = {
@@ -312,32 +87,32 @@ def test_torque_stays_within_its_limits(robot: str) -> None:
         "initial_error": 0.5,
     }
     limit = plant(robot).arm.torque_limit
-    limited = list(states(with_(setting), 0.5))
+    limited = list(states(parameters(setting), 0.5))
     assert all(np.all(np.abs(s.torque) <= limit) for s in limited)
     assert limited[-1].peak_torque == limit.max()
-    free = list(states(with_(setting, torque_limits=False), 0.02))
+    free = list(states(parameters(setting, torque_limits=False), 0.02))
     assert np.any(np.abs(free[1].torque) > limit)
 
 
 def test_a_slow_controller_looks_across_world_steps() -> None:
-    path = list(states(with_({}, control_period=0.05), 0.5))
+    path = list(states(parameters({}, control_period=0.05), 0.5))
     changes = [k for k in range(1, 50) if np.any(path[k + 1].torque != path[k].torque)]
     assert changes == [5, 10, 15, 20, 25, 30, 35, 40, 45]
 
 
 def test_the_reference_is_the_one_asked_for_at_its_time() -> None:
     home = plant("ur5").arm.home
-    for k, state in enumerate(states(with_({}, amplitude=0.25, frequency=0.7), 4.0)):
+    for k, state in enumerate(states(parameters({}, amplitude=0.25, frequency=0.7), 4.0)):
         sine = 0.25 * np.sin(2 * np.pi * 0.7 * k * LAB.period)
         np.testing.assert_allclose(state.q_ref, home + sine, atol=1e-12)
-    for k, state in enumerate(states(with_({}, reference="minimum-jerk", duration=0.5), 3.0)):
+    for k, state in enumerate(states(parameters({}, reference="minimum-jerk", duration=0.5), 3.0)):
         if k * LAB.period % 1.5 in (0.5, 0.75):
             np.testing.assert_allclose(state.q_ref, home + 0.3, atol=1e-12)
 
 
 def test_the_controller_sees_the_reference_of_its_own_tick() -> None:
     """At 5 ms the last tick of a world step is 5 ms before its end."""
-    params = with_({"controller": "open-loop", "control_period": 0.005}, frequency=1.0)
+    params = parameters({"controller": "open-loop", "control_period": 0.005}, frequency=1.0)
     known = plant("ur5")
     for state in list(states(params, 0.3))[1:]:
         phase = 2 * np.pi * (state.t - 0.005)
@@ -351,53 +126,33 @@ def test_the_controller_sees_the_reference_of_its_own_tick() -> None:
         np.testing.assert_allclose(state.torque, tau, rtol=1e-9, atol=1e-9)
 
 
-def test_eigenvalues_are_those_of_the_loop_with_its_payload_and_friction() -> None:
-    params = with_({}, payload=4.0, friction=3.0, amplitude=0.0)
-    state = LAB.init(params, np.random.default_rng(0))
-    world, q0, d = plant("ur5", 4.0), state.q_ref, 1e-6
-
-    # What holds the payload where the loop is linearised, so that it rests there.
-    held = pin.computeGeneralizedGravity(world.model, world.data, q0) - gravity(params, q0)
-
-    def rate(x: np.ndarray) -> np.ndarray:
-        q, v = x[:6], x[6:]
-        tau = held + params.kp * (q0 - q) - params.kd * v + gravity(params, q)
-        return np.concatenate([v, world.acceleration(tau, 3.0)(q, v)])
-
-    at = np.concatenate([q0, np.zeros(6)])
-    slope = np.array([(rate(at + d * e) - rate(at - d * e)) / (2 * d) for e in np.eye(12)]).T
-    fields = LAB.fields(params, state)
-    found = np.sort_complex(fields["poles_re"] + 1j * fields["poles_im"])
-    np.testing.assert_allclose(found, np.sort_complex(np.linalg.eigvals(slope)), rtol=1e-5)
-
-
 def test_changing_the_frequency_live_does_not_move_the_reference() -> None:
-    slow, fast = with_({}), with_({}, frequency=2.0)
-    state = last(slow, 1.23)
+    slow, fast = parameters({}), parameters({}, frequency=2.0)
+    state = final_state(slow, 1.23)
     after = LAB.step(fast, Inputs(), state)
     assert np.abs(after.q_ref - state.q_ref).max() < 0.3 * 2 * np.pi * 2.0 * LAB.period
 
 
 def test_the_integral_is_empty_unless_used() -> None:
-    filled = last(with_({}, controller="pid", ki=100.0), 0.5)
+    filled = final_state(parameters({}, controller="pid", ki=100.0), 0.5)
     assert filled.integral.any()
-    assert not LAB.step(with_({}, controller="pid"), Inputs(), filled).integral.any()
-    assert not LAB.step(with_({}, ki=100.0), Inputs(), filled).integral.any()
+    assert not LAB.step(parameters({}, controller="pid"), Inputs(), filled).integral.any()
+    assert not LAB.step(parameters({}, ki=100.0), Inputs(), filled).integral.any()
 
 
 def test_the_step_response_of_a_known_system() -> None:
     """Computed torque with zeta = 0.5, omega = 6: overshoot exp(-pi zeta / sqrt(1 - zeta^2))."""
-    params = with_(
+    params = parameters(
         {"controller": "computed-torque", "kp": 36.0, "kd": 6.0, "reference": "set-point"},
         initial_error=0.2,
         torque_limits=False,
         integrator="rk4",
     )
-    rest = last(params, 5.0)
+    rest = final_state(params, 5.0)
     measure = LAB.measure(params, rest)
     assert measure["overshoot"] == pytest.approx(16.30, abs=0.3)
     assert measure["settling_time"] == pytest.approx(1.347, abs=0.02)
-    assert "settling_time" not in LAB.measure(params, last(params, 0.5))
+    assert "settling_time" not in LAB.measure(params, final_state(params, 0.5))
     moved = LAB.step(params.change({"amplitude": 0.5}), Inputs(), rest)
     assert moved.response is not None
     assert moved.response.size == pytest.approx(0.2)
@@ -405,7 +160,7 @@ def test_the_step_response_of_a_known_system() -> None:
 
 
 def test_read_outs_are_what_they_say() -> None:
-    params = with_({}, initial_error=0.1, payload=3.0)
+    params = parameters({}, initial_error=0.1, payload=3.0)
     path = list(states(params, 3.0))
     errors = np.array([error(s) for s in path])
     measure = LAB.measure(params, path[-1])
@@ -428,7 +183,7 @@ def same(one: JointState, other: JointState) -> bool:
 
 
 def test_the_same_seed_gives_the_same_bits() -> None:
-    params = with_({}, noise=0.003, controller="pid", ki=50.0)
+    params = parameters({}, noise=0.003, controller="pid", ki=50.0)
     one, two = (list(states(params, 1.0, {20: PUSHED}, seed=3)) for _ in range(2))
     assert all(same(a, b) for a, b in zip(one, two, strict=True))
     other = list(states(params, 1.0, {20: PUSHED}, seed=4))
@@ -436,8 +191,8 @@ def test_the_same_seed_gives_the_same_bits() -> None:
 
 
 def test_a_state_can_be_kept_and_rewound() -> None:
-    params = with_({}, noise=0.003, reference="set-point", initial_error=0.1)
-    kept = last(params, 0.3)
+    params = parameters({}, noise=0.003, reference="set-point", initial_error=0.1)
+    kept = final_state(params, 0.3)
     copied = copy.deepcopy(kept)
     after = LAB.step(params, PUSHED, kept)
     LAB.step(params.change({"payload": 4.0}), Inputs(), after)
@@ -447,36 +202,8 @@ def test_a_state_can_be_kept_and_rewound() -> None:
         assert not any(np.shares_memory(old, new) for new in arrays(after))
 
 
-def test_noise_has_the_deviation_asked_for_and_no_memory() -> None:
-    params = with_({}, noise=0.004)
-    state = LAB.init(params, np.random.default_rng(1))
-    rows = []
-    for k in range(2000):
-        state.steps = k
-        noise = LAB._noise(params, state, tuple(range(10)))
-        assert noise is not None
-        rows.append(noise)
-    samples = np.concatenate(rows)
-    n = samples[:, 0].size
-    for kind, sigma in ((0, 0.004), (1, 0.004 * VELOCITY_NOISE)):
-        x = samples[:, kind] / sigma
-        assert abs(x.mean()) < 4 / np.sqrt(n)
-        assert abs(x.std() - 1) < 4 / np.sqrt(2 * n)
-        for lag in (1, 2, 5, 10, 20):
-            assert abs(np.mean(x[lag:] * x[:-lag])) < 4 / np.sqrt(n)
-
-
-def test_noise_does_not_depend_on_the_integration_step() -> None:
-    state = LAB.init(with_({}), np.random.default_rng(1))
-    coarse = LAB._noise(with_({}, noise=0.01), state, tuple(range(10)))
-    fine = LAB._noise(with_({}, noise=0.01, step=0.0001), state, tuple(range(0, 100, 10)))
-    assert coarse is not None
-    assert fine is not None
-    np.testing.assert_array_equal(coarse, fine)
-
-
 def test_trouble_keeps_the_last_sane_state() -> None:
-    params = with_(EXPERIMENTS["A slow controller chatters"], torque_limits=False)
+    params = parameters(ARTICLE.settings["A slow controller chatters"], torque_limits=False)
     *_, sane, stopped = states(params, 1.0)
     assert f"t = {stopped.t:.2f} s" in stopped.trouble
     assert same(sane, stopped)
@@ -512,7 +239,7 @@ def check_measure(params: JointParams, state: JointState, first: JointState) -> 
 @pytest.mark.parametrize("robot", ["ur5", "panda", "double-pendulum"])
 @pytest.mark.parametrize("changes", ends())
 def test_both_ends_of_every_slider(changes: Mapping[str, Value], robot: str) -> None:
-    params = with_({"robot": robot, **changes})
+    params = parameters({"robot": robot, **changes})
     path = list(states(params, 1.0, {50: PUSHED}))
     check_measure(params, path[-1], path[0])
     assert path[-1].trouble or path[-1].t == pytest.approx(1.0)
@@ -523,26 +250,17 @@ def test_both_ends_of_every_slider(changes: Mapping[str, Value], robot: str) -> 
     assert {"camera", "robot", "reference", "pull"} <= set(scene.names)
 
 
-def test_plots_name_real_channels() -> None:
-    params = with_({}, reference="set-point", initial_error=0.1)
-    rest = last(params, 5.0)
-    measure, fields = LAB.measure(params, rest), LAB.fields(params, rest)
-    for plot in LAB.plots:
-        assert set(measured(plot)) <= set(measure)
-        assert set(pictured(plot)) <= set(fields)
-
-
 @pytest.mark.parametrize("name", LAB.presets)
 def test_presets_run_well(name: str) -> None:
-    path = list(states(with_(LAB.presets[name]), 3.0))
+    path = list(states(parameters(LAB.presets[name]), 3.0))
     assert not path[-1].trouble
     assert np.abs(error(path[-1])).max() < 0.06
 
 
 def test_the_force_is_drawn_while_it_lasts() -> None:
-    params = with_({})
-    pushed = last(params, 0.1, {5: PUSHED})
-    for state, drawn in ((pushed, True), (last(params, 0.1), False)):
+    params = parameters({})
+    pushed = final_state(params, 0.1, {5: PUSHED})
+    for state, drawn in ((pushed, True), (final_state(params, 0.1), False)):
         scene = NullScene()
         LAB.draw(scene, params, state)
         assert ("force" in scene.names) == drawn

@@ -6,8 +6,8 @@ from scipy.integrate import solve_ivp
 
 from labs.algorithms.integrators import INTEGRATORS
 from labs.reactive_control.joint_control.sampled_control import (
-    Loop,
-    run,
+    SampledLoop,
+    simulate_sampled,
     ticks,
     time_between_ticks,
     units,
@@ -17,10 +17,10 @@ HOME = np.zeros(2)
 FREE = np.full(2, np.inf)
 
 
-def loop(limit: np.ndarray = FREE, gain: float = 0.0, h: float = 1e-3) -> Loop:
+def loop(limit: np.ndarray = FREE, gain: float = 0.0, h: float = 1e-3) -> SampledLoop:
     """Two unit masses, k_p = 30, k_d = 2, k_z = 7, and a little nonlinear pull."""
     held = np.zeros(2)
-    return Loop(
+    return SampledLoop(
         law=lambda q, v, z, q_ref, v_ref, a_ref: 30 * (q_ref - q) + 2 * (v_ref - v) + 7 * z,
         limit=limit,
         acceleration=lambda q, v: held - np.sin(q),
@@ -66,7 +66,7 @@ def test_the_torque_is_held_between_ticks() -> None:
     one = loop(gain=gain)
     one.held[:] = [1.0, -2.0]
     zeros = np.zeros(2)
-    q, v, z, torques = run(one, due, steps, references(3), None, zeros, zeros, zeros)
+    q, v, z, torques = simulate_sampled(one, due, steps, references(3), None, zeros, zeros, zeros)
 
     x, integral, tau = np.zeros(4), np.zeros(2), np.array([1.0, -2.0])
     applied = []
@@ -94,7 +94,7 @@ def test_without_a_tick_the_last_torque_stays() -> None:
     one = loop()
     one.held[:] = [0.4, 0.1]
     zeros = np.zeros(2)
-    _, v, _, torques = run(one, (), 10, references(0), None, zeros, zeros, zeros)
+    _, v, _, torques = simulate_sampled(one, (), 10, references(0), None, zeros, zeros, zeros)
     assert torques.shape == (0, 2)
     np.testing.assert_allclose(v, 0.01 * one.held, rtol=1e-4)
 
@@ -102,7 +102,7 @@ def test_without_a_tick_the_last_torque_stays() -> None:
 def test_torques_are_cut_to_the_limit_in_both_directions() -> None:
     one = loop(limit=np.array([3.0, 4.0]))
     zeros = np.zeros(2)
-    _, _, _, torques = run(one, (0,), 1, references(1), None, zeros, zeros, zeros)
+    _, _, _, torques = simulate_sampled(one, (0,), 1, references(1), None, zeros, zeros, zeros)
     np.testing.assert_array_equal(torques, [[3.0, -4.0]])
 
 
@@ -110,7 +110,7 @@ def test_the_controller_sees_the_noise_and_the_world_does_not() -> None:
     noise = np.array([[[0.1, 0.0], [0.0, -0.3]]])
     zeros = np.zeros(2)
     one = loop(gain=1.0)
-    _, v, z, torques = run(one, (0,), 1, references(1), noise, zeros, zeros, zeros)
+    _, v, z, torques = simulate_sampled(one, (0,), 1, references(1), noise, zeros, zeros, zeros)
     np.testing.assert_allclose(torques, [[30 * 0.4, 30 * -0.2 + 2 * 0.3]])
     np.testing.assert_allclose(z, [0.4, -0.2])
     np.testing.assert_allclose(v, 1e-3 * torques[0], rtol=1e-6)
@@ -118,7 +118,7 @@ def test_the_controller_sees_the_noise_and_the_world_does_not() -> None:
 
 def test_arguments_are_left_alone() -> None:
     q, v, z = np.full(2, 0.1), np.full(2, 0.2), np.full(2, 0.3)
-    new = run(loop(gain=1.0), (0,), 3, references(1), None, q, v, z)
+    new = simulate_sampled(loop(gain=1.0), (0,), 3, references(1), None, q, v, z)
     for array, value in ((q, 0.1), (v, 0.2), (z, 0.3)):
         np.testing.assert_array_equal(array, value)
         assert not any(np.shares_memory(array, made) for made in new)

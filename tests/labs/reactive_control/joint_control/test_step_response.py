@@ -7,10 +7,10 @@ from labs.reactive_control.joint_control.step_response import BAND, StepResponse
 
 
 def respond(error: np.ndarray, times: np.ndarray) -> StepResponse:
-    response = StepResponse.to(0.0, error[0])
+    response = StepResponse.begin(0.0, error[0])
     assert response is not None
     for t, e in zip(times[1:], error[1:], strict=True):
-        response = response.after(float(t), e)
+        response = response.update(float(t), e)
     return response
 
 
@@ -37,15 +37,15 @@ def test_an_error_that_stays_never_settles() -> None:
 
 
 def test_leaving_the_band_unsettles() -> None:
-    response = StepResponse.to(2.0, np.array([1.0]))
+    response = StepResponse.begin(2.0, np.array([1.0]))
     assert response is not None
-    inside = response.after(3.0, np.array([0.01])).after(4.0, np.array([-0.01]))
+    inside = response.update(3.0, np.array([0.01])).update(4.0, np.array([-0.01]))
     assert inside.settled == 1.0
-    again = inside.after(5.0, np.array([-0.05]))
+    again = inside.update(5.0, np.array([-0.05]))
     assert again.settled < 0
-    assert again.after(6.0, np.array([0.0])).settled == 4.0
+    assert again.update(6.0, np.array([0.0])).settled == 4.0
     assert again.overshoot == pytest.approx(0.05)
 
 
 def test_no_step_no_response() -> None:
-    assert StepResponse.to(0.0, np.zeros(3)) is None
+    assert StepResponse.begin(0.0, np.zeros(3)) is None

@@ -1,10 +1,7 @@
 """The lab kinematics: what its article claims, in numbers, and what it shows and measures."""
 
 import copy
-import re
-import tomllib
 from collections.abc import Iterator, Mapping
-from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -21,30 +18,16 @@ from labs.algorithms.orientation import (
 from labs.lab import Inputs
 from labs.models.arms import load
 from labs.params import Value
-from labs.reactive_control.kinematics.lab import (
-    HIGHEST,
-    Kinematics,
-    KinematicsParams,
-    KinematicsState,
-)
+from labs.reactive_control.kinematics.lab import MAX_AMPLIFICATION, Kinematics, KinematicsState
+from labs.reactive_control.kinematics.params import KinematicsParams
 from labs.scene import NullScene
+from tests.labs.experiments import Experiments
 
 LAB = Kinematics()
-ARTICLE = files("labs.reactive_control").joinpath("kinematics.md").read_text(encoding="utf-8")
-EXPERIMENTS: Mapping[str, Mapping[str, Value]] = {
-    block["title"]: block["set"]
-    for block in map(tomllib.loads, re.findall(r"```experiment\n(.*?)```", ARTICLE, re.DOTALL))
-}
-VERIFIED: set[str] = set()
+ARTICLE = Experiments("labs.reactive_control", "kinematics")
 
 
-def experiment(title: str) -> pytest.MarkDecorator:
-    """Marks the test that verifies this experiment and gives it the experiment's settings."""
-    VERIFIED.add(title)
-    return pytest.mark.parametrize("setting", [EXPERIMENTS[title]], ids=[title])
-
-
-def with_(setting: Mapping[str, Value], **changes: Value) -> KinematicsParams:
+def parameters(setting: Mapping[str, Value], **changes: Value) -> KinematicsParams:
     return KinematicsParams().change({**setting, **changes})
 
 
@@ -71,14 +54,14 @@ def fields(params: KinematicsParams) -> Mapping[str, np.ndarray]:
 
 def test_a_robot_stops_at_its_limits() -> None:
     model = load("panda").model
-    params = with_({}, robot="panda", q4=3.0, q2=-3.0)
+    params = parameters({}, robot="panda", q4=3.0, q2=-3.0)
     assert params.q[3] == model.upperPositionLimit[3]
     assert params.q[1] == model.lowerPositionLimit[1]
     assert params.q[0] == params.q1
 
 
 def test_the_slider_moved_last_chooses_the_factor() -> None:
-    arm, params = load("ur5"), with_({})
+    arm, params = load("ur5"), parameters({})
     state = LAB.step(params, Inputs(), LAB.init(params, np.random.default_rng(0)))
     assert state.moved == 1
     for i in (4, 2, 7):
@@ -96,7 +79,7 @@ def test_the_slider_moved_last_chooses_the_factor() -> None:
 
 def test_the_shown_frame_is_labelled() -> None:
     for robot, frames in (("ur5", 7), ("panda", 8)):
-        params = with_({}, robot=robot)
+        params = parameters({}, robot=robot)
         scene = NullScene()
         LAB.draw(scene, params, LAB.init(params, np.random.default_rng(0)))
         assert sum(name.startswith("frame ") for name in scene.names) == frames
@@ -108,7 +91,7 @@ def test_five_ways_say_the_same(sequence: str) -> None:
     """The orientation of the end-effector, by SciPy from each of them."""
     for q in np.random.default_rng(5).uniform(-3.0, 3.0, (10, 6)):
         sliders = {f"q{i}": float(a) for i, a in enumerate(q, start=1)}
-        found = fields(with_({}, sequence=sequence, **sliders))
+        found = fields(parameters({}, sequence=sequence, **sliders))
         wanted = found["rotation"]
         np.testing.assert_array_equal(found["product"][:3, :3], wanted)
         angle, *axis = found["angle_axis"][0]
@@ -129,7 +112,7 @@ def test_five_ways_say_the_same(sequence: str) -> None:
 @pytest.mark.parametrize("direction", ["lost", "first", "second"])
 @pytest.mark.parametrize("sequence", SEQUENCES)
 def test_amplification_is_that_of_the_rates(sequence: str, direction: str) -> None:
-    params = with_({}, sequence=sequence, direction=direction, distance=0.3, size=0.2)
+    params = parameters({}, sequence=sequence, direction=direction, distance=0.3, size=0.2)
     for state in list(states(params, 4.0))[::37]:
         angles = matrix_to_euler(sequence, state.rotation)
         rates = euler_rates(sequence, angles, params.gimbal.axis)
@@ -142,7 +125,7 @@ def test_amplification_is_that_of_the_rates(sequence: str, direction: str) -> No
 @pytest.mark.parametrize("sequence", SEQUENCES)
 def test_the_distance_is_that_from_the_lock(sequence: str) -> None:
     """All twelve meet the law's worst case at 1 / sin(delta)."""
-    params = with_({}, sequence=sequence, distance=0.02)
+    params = parameters({}, sequence=sequence, distance=0.02)
     measure = LAB.measure(params, LAB.init(params, np.random.default_rng(0)))
     assert measure["law"] == pytest.approx(1.0 / np.sin(0.02), rel=1e-9)
     assert measure["amplification"] == pytest.approx(1.0 / np.sin(0.02), rel=1e-4)
@@ -151,7 +134,9 @@ def test_the_distance_is_that_from_the_lock(sequence: str) -> None:
 @pytest.mark.parametrize("sequence", ["zyx", "zxz"])
 def test_the_quaternion_moves_half_as_fast_as_the_body(sequence: str) -> None:
     """Each step is the chord of half the turn, however close the lock."""
-    channels = recorded(with_({}, sequence=sequence, distance=0.0, size=0.5, frequency=1.0), 1.0)
+    channels = recorded(
+        parameters({}, sequence=sequence, distance=0.0, size=0.5, frequency=1.0), 1.0
+    )
     quaternions = np.column_stack([channels[name] for name in ("qw", "qx", "qy", "qz")])
     steps = np.linalg.norm(np.diff(quaternions, axis=0), axis=1)
     turned = np.diff(0.5 * np.sin(2.0 * np.pi * np.arange(101) * LAB.period))
@@ -163,14 +148,14 @@ def test_the_quaternion_moves_half_as_fast_as_the_body(sequence: str) -> None:
 @pytest.mark.parametrize("sequence", SEQUENCES)
 def test_the_quaternion_needs_no_change_of_sign(sequence: str) -> None:
     for direction in ("lost", "first", "second"):
-        params = with_({}, sequence=sequence, distance=0.0, size=0.5, direction=direction)
+        params = parameters({}, sequence=sequence, distance=0.0, size=0.5, direction=direction)
         assert recorded(params.change({"frequency": 2.0}), 0.5)["qw"].min() > 0.4
         far = params.change({"frequency": 2.0, "distance": 1.57})
         assert recorded(far, 0.5)["qw"].min() > 0.4
 
 
 def test_peaks_start_anew_with_other_settings() -> None:
-    params = with_({}, distance=0.0035)
+    params = parameters({}, distance=0.0035)
     *_, state = states(params, 4.0)
     assert state.peak_rate > 40.0
     calm = params.change({"distance": 1.0})
@@ -182,14 +167,14 @@ def test_peaks_start_anew_with_other_settings() -> None:
 
 
 def test_at_the_lock_itself_numbers_stay_finite() -> None:
-    channels = recorded(with_({}, distance=0.0))
-    assert channels["law"].max() == HIGHEST
-    assert channels["amplification"].max() == HIGHEST
+    channels = recorded(parameters({}, distance=0.0))
+    assert channels["law"].max() == MAX_AMPLIFICATION
+    assert channels["amplification"].max() == MAX_AMPLIFICATION
     assert all(np.isfinite(values).all() for values in channels.values())
 
 
 def test_a_step_leaves_its_state_alone() -> None:
-    params = with_({})
+    params = parameters({})
     state = LAB.init(params, np.random.default_rng(0))
     kept = copy.deepcopy(state)
     LAB.step(params.change({"q2": 0.1}), Inputs(), state)
@@ -200,18 +185,14 @@ def test_a_step_leaves_its_state_alone() -> None:
 # The experiments ------------------------------------------------------------------------------
 
 
-def test_every_experiment_is_verified() -> None:
-    assert set(EXPERIMENTS) == VERIFIED
-
-
 def changed(setting: Mapping[str, Value], name: str) -> np.ndarray:
     """Which entries of a field the setting changes, from the defaults."""
-    before = fields(with_({}, factor=str(setting["factor"])))[name]
-    difference: np.ndarray = np.abs(fields(with_(setting))[name] - before) > 1e-6
+    before = fields(parameters({}, factor=str(setting["factor"])))[name]
+    difference: np.ndarray = np.abs(fields(parameters(setting))[name] - before) > 1e-6
     return difference
 
 
-@experiment("One slider, one factor")
+@ARTICLE.verify("One slider, one factor")
 def test_one_slider(setting: Mapping[str, Value]) -> None:
     assert KinematicsParams().q3 == 1.3
     factor = changed(setting, "factor")
@@ -220,32 +201,34 @@ def test_one_slider(setting: Mapping[str, Value]) -> None:
     product = changed(setting, "product")
     assert product[:3].all()
     assert not product[3].any()
-    entries = fields(with_(setting))["factor"][factor]
+    entries = fields(parameters(setting))["factor"][factor]
     sine, cosine = np.sin(0.5), np.cos(0.5)
     np.testing.assert_allclose(sorted(entries), [-sine, sine, cosine, cosine], atol=1e-12)
 
 
-@experiment("The last joint")
+@ARTICLE.verify("The last joint")
 def test_the_last_joint(setting: Mapping[str, Value]) -> None:
     assert KinematicsParams().q6 == 0.5
     product = changed(setting, "product")
     assert product[:3, :2].all()
     assert not product[:, 2:].any()
-    row = fields(with_(setting))["dependence"][-1]
+    row = fields(parameters(setting))["dependence"][-1]
     assert row[-1] == pytest.approx(np.sqrt(2.0), rel=1e-8)
     assert row[:-1].min() > np.sqrt(2.0) + 1e-4
 
 
-@experiment("Is it still a rotation?")
+@ARTICLE.verify("Is it still a rotation?")
 def test_still_a_rotation(setting: Mapping[str, Value]) -> None:
-    measure = LAB.measure(with_(setting), LAB.init(with_(setting), np.random.default_rng(0)))
+    measure = LAB.measure(
+        parameters(setting), LAB.init(parameters(setting), np.random.default_rng(0))
+    )
     assert measure["orthogonality"] < 1e-15
     assert measure["determinant"] == pytest.approx(1.0, abs=1e-15)
 
 
-@experiment("Two degrees from the lock")
+@ARTICLE.verify("Two degrees from the lock")
 def test_two_degrees(setting: Mapping[str, Value]) -> None:
-    channels = recorded(with_(setting))
+    channels = recorded(parameters(setting))
     swing = np.arctan2(np.sin(0.1), np.tan(0.035))
     assert swing == pytest.approx(1.23, abs=0.005)
     assert channels["phi"].max() == pytest.approx(swing, rel=1e-12)
@@ -256,9 +239,9 @@ def test_two_degrees(setting: Mapping[str, Value]) -> None:
         assert np.abs(channels[name] - channels[name][0]).max() < 0.037
 
 
-@experiment("Ten times closer")
+@ARTICLE.verify("Ten times closer")
 def test_ten_times_closer(setting: Mapping[str, Value]) -> None:
-    channels = recorded(with_(setting))
+    channels = recorded(parameters(setting))
     assert channels["phi"].max() == pytest.approx(1.54, abs=0.005)
     speed = 2.0 * np.pi * 0.25 * 0.1
     assert channels["peak_speed"][-1] == pytest.approx(0.157, abs=0.0005)
@@ -268,9 +251,9 @@ def test_ten_times_closer(setting: Mapping[str, Value]) -> None:
     assert channels["law"].max() * speed == pytest.approx(45.0, abs=0.2)
 
 
-@experiment("Directions that are left")
+@ARTICLE.verify("Directions that are left")
 def test_directions_that_are_left(setting: Mapping[str, Value]) -> None:
-    channels = recorded(with_(setting))
+    channels = recorded(parameters(setting))
     assert channels["law"].min() > 285.0
     np.testing.assert_allclose(channels["amplification"], 1.0, rtol=1e-5)
     assert channels["peak_rate"][-1] == pytest.approx(channels["peak_speed"][-1], rel=1e-6)
@@ -279,9 +262,9 @@ def test_directions_that_are_left(setting: Mapping[str, Value]) -> None:
     assert np.ptp(channels["phi"]) == pytest.approx(0.2, rel=1e-9)
 
 
-@experiment("Through the lock")
+@ARTICLE.verify("Through the lock")
 def test_through_the_lock(setting: Mapping[str, Value]) -> None:
-    params = with_(setting)
+    params = parameters(setting)
     channels = recorded(params)
     assert channels["theta"].max() <= np.pi / 2
     assert channels["theta"].max() > np.pi / 2 - 0.002
@@ -297,9 +280,9 @@ def test_through_the_lock(setting: Mapping[str, Value]) -> None:
     assert np.abs(np.diff(quaternions, axis=0)).max() < 0.001
 
 
-@experiment("An arm at its own lock")
+@ARTICLE.verify("An arm at its own lock")
 def test_an_arm_at_its_lock(setting: Mapping[str, Value]) -> None:
-    params = with_(setting)
+    params = parameters(setting)
     measure = LAB.measure(params, LAB.init(params, np.random.default_rng(0)))
     assert measure["tool_law"] == pytest.approx(34.0, abs=0.5)
     angles = {
@@ -315,13 +298,17 @@ def test_an_arm_at_its_lock(setting: Mapping[str, Value]) -> None:
         assert np.delete(steps, 2).max() < 1e-3
 
 
-@experiment("Another sequence")
+@ARTICLE.verify("Another sequence")
 def test_another_sequence(setting: Mapping[str, Value]) -> None:
-    params = with_(setting)
-    assert params.q.tolist() == with_(EXPERIMENTS["An arm at its own lock"]).q.tolist()
+    params = parameters(setting)
+    assert params.q.tolist() == parameters(ARTICLE.settings["An arm at its own lock"]).q.tolist()
     measure = LAB.measure(params, LAB.init(params, np.random.default_rng(0)))
     assert measure["tool_law"] == pytest.approx(1.0, abs=0.005)
     assert fields(params)["euler"][0, 1] == pytest.approx(np.pi / 2, abs=0.1)
     # Its own lock: the z axis vertical.
     upright = matrix_to_euler("zyz", Rotation.from_euler("z", 0.4).as_matrix())
     assert lock_sine("zyz", upright[1]) == 0.0
+
+
+def test_every_experiment_is_verified() -> None:
+    ARTICLE.check_all_are_verified()

@@ -9,15 +9,16 @@ import pytest
 
 from labs.lab import Inputs
 from labs.models.plant import plant
-from labs.models.postures import POSTURES, ROBOTS
 from labs.params import Value
-from labs.reactive_control.statics.lab import ARROW, STRONGEST, Statics, StaticsParams, StaticsState
+from labs.reactive_control.statics.lab import FORCE_ARROW, STRONGEST_PULL, Statics, StaticsState
+from labs.reactive_control.statics.params import StaticsParams
 from labs.scene import NullScene
+from labs.tasks.arm.postures import POSED_ARMS, POSTURES
 from tests.labs.experiments import Experiments
 
 LAB = Statics()
 ARTICLE = Experiments("labs.reactive_control", "statics")
-EVERY = [(robot, name) for robot in ROBOTS for name in POSTURES]
+EVERY = [(robot, name) for robot in POSED_ARMS for name in POSTURES]
 Row = dict[str, np.ndarray]
 
 
@@ -129,7 +130,7 @@ def test_torque_is_what_virtual_work_says(robot: str, posture: str) -> None:
     np.testing.assert_allclose(found, expected, atol=1e-7)
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", POSED_ARMS)
 def test_torque_holds_against_the_wrench(robot: str) -> None:
     """With -tau + g(q) at the joints and w at the end-effector nothing accelerates: Pinocchio
     takes w as a force on the last body, in its own frame, without any Jacobian."""
@@ -164,7 +165,7 @@ def test_the_two_powers_are_one(robot: str, posture: str) -> None:
         assert row["tau"] @ params.dq == row["joint_power"]
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", POSED_ARMS)
 def test_singular_values_bound_the_torque_of_a_force(robot: str) -> None:
     rng = np.random.default_rng(4)
     params = with_({"robot": robot, "q2": 0.3})
@@ -184,12 +185,12 @@ def test_singular_values_bound_the_torque_of_a_force(robot: str) -> None:
 def test_the_force_follows_the_handle_and_stays() -> None:
     params = with_()
     tip = plant("ur5").tip(params.q)
-    hand = tuple(tip + ARROW * np.array([0.0, 90.0, 120.0]))
+    hand = tuple(tip + FORCE_ARROW * np.array([0.0, 90.0, 120.0]))
     state = start(params)
     held = LAB.step(params, Inputs(handles={"pull": hand}), state)
     assert forced(params, held) == pytest.approx([0, 90, 120], abs=1e-9)
     released = LAB.step(params, Inputs(), held)
-    np.testing.assert_array_equal(released.pulled, held.pulled)
+    np.testing.assert_array_equal(released.pull, held.pull)
     # A slider then adds to what was dragged.
     more = params.change({"fx": params.fx + 10.0})
     assert forced(more, released) == pytest.approx([10, 90, 120], abs=1e-9)
@@ -201,7 +202,7 @@ def test_dragging_pulls_no_harder_than_it_may() -> None:
     params = with_()
     far = Inputs(handles={"pull": (9.0, 9.0, 9.0)})
     assert LAB.measure(params, LAB.step(params, far, start(params)))["force"] == pytest.approx(
-        STRONGEST
+        STRONGEST_PULL
     )
 
 
@@ -218,7 +219,7 @@ def test_the_handle_is_at_the_arrows_tip() -> None:
     LAB.draw(scene, params, start(params))
     np.testing.assert_array_equal(scene.end, scene.ball)
     tip = plant("ur5").tip(params.q)
-    np.testing.assert_allclose(scene.ball - tip, ARROW * params.force, atol=1e-15)
+    np.testing.assert_allclose(scene.ball - tip, FORCE_ARROW * params.force, atol=1e-15)
 
 
 def test_time_passes_and_nothing_else() -> None:
@@ -228,8 +229,8 @@ def test_time_passes_and_nothing_else() -> None:
     after = LAB.step(params, Inputs(handles={"pull": (0.5, 0.5, 0.5)}), state)
     assert after.t == pytest.approx(LAB.period)
     assert state.t == kept.t
-    np.testing.assert_array_equal(state.pulled, kept.pulled)
-    assert not np.shares_memory(after.pulled, state.pulled)
+    np.testing.assert_array_equal(state.pull, kept.pull)
+    assert not np.shares_memory(after.pull, state.pull)
 
 
 def test_arcs_turn_the_way_the_torques_do() -> None:

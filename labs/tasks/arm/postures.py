@@ -14,7 +14,7 @@ from labs.errors import LabError
 from labs.models.arms import load
 from labs.models.plant import plant
 
-ROBOTS = ("ur5", "panda", "double-pendulum")
+POSED_ARMS = ("ur5", "panda", "double-pendulum")
 """The arms that have them."""
 POSTURES: Mapping[str, str] = {
     "home": "Home, bent",

@@ -7,9 +7,9 @@ import pytest
 from labs.errors import LabError
 from labs.models.arms import load
 from labs.models.plant import plant
-from labs.models.postures import POSTURES, ROBOTS, posture
+from labs.tasks.arm.postures import POSED_ARMS, POSTURES, posture
 
-EVERY = [(robot, name) for robot in ROBOTS for name in POSTURES]
+EVERY = [(robot, name) for robot in POSED_ARMS for name in POSTURES]
 
 
 @pytest.mark.parametrize(("robot", "name"), EVERY)
@@ -26,7 +26,7 @@ def test_it_is_within_reach_and_above_the_floor(robot: str, name: str) -> None:
     assert all(data.oMi[j].translation[2] > 0.08 for j in range(1, world.model.njoints))
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("robot", POSED_ARMS)
 def test_straight_arms_have_lost_a_direction(robot: str) -> None:
     """Or almost: the Panda's elbow cannot open all the way."""
     world = plant(robot)

@@ -1,4 +1,5 @@
-"""What learning from experience consists of, for the compiled loops of model-free control.
+"""What learning from experience consists of, for the compiled loops of model-free control, and of
+Monte Carlo, TD prediction and TD(lambda) to come.
 
 An `EpisodicTask` is a finite MDP seen from inside: a learner cannot look at its tables, it only
 starts an episode, applies a control and is told the cost and the next state. An `UpdateRule` says

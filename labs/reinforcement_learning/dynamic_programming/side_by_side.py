@@ -207,6 +207,8 @@ def _pack_policy(policy: np.ndarray) -> np.ndarray:
 
 
 def unpack_policy(mdp: FiniteMDP, policy: np.ndarray) -> np.ndarray:
+    """A row (X,) of `Iterates.policy` as the algorithms take it: controls (X,), or where it is
+    RANDOM the even probabilities (X, U)."""
     return random_policy(mdp) if policy[0] == RANDOM else policy.astype(np.int64)
 
 

@@ -126,7 +126,7 @@ def draw_walkers(scene: Scene, world: GridWorld, walk: GridWalk) -> None:
 def _look_at(scene: Scene, near: Sequence[float], far: np.ndarray) -> None:
     """So that what reaches from the corner `near` to `far`, as wide as it is, is in view."""
     depth = float(far[1]) - near[1]
-    distance = max(-2.0 * near[0], 1.2 * depth)
+    distance = max(-1.8 * near[0], 1.2 * depth)
     middle = near[1] + 0.5 * depth
     scene.camera((0.0, middle - 0.5 * distance, 0.6 * distance), (0.0, middle, 0.0))
 
@@ -177,4 +177,4 @@ def _draw_policy(
     along = size * np.stack([right, -down, 0 * right], axis=1)
     along = along / np.maximum(np.hypot(down, right), 1.0)[:, None]
     middles = places[tuple(world.cells[states].T)] + LIFT
-    scene.arrows(name, middles + back * along, middles + ahead * along, "muted")
+    scene.arrows(name, middles + back * along, middles + ahead * along, "force")

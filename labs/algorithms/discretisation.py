@@ -1,4 +1,5 @@
-"""Linear systems in discrete time: what one period of x' = A x + B u makes of x, u held (A.2).
+"""Linear systems in discrete time: what one period of x' = A x + B u makes of x, u
+held (notes, A.2).
 
     x+ = Phi x + Gamma u,   Phi = exp(A T),   Gamma = int_0^T exp(A s) ds B
 

@@ -1,4 +1,5 @@
-"""The tunables of a motion to plan (`labs.tasks.motion.motions`),."""
+"""The tunables of a motion to plan (`labs.tasks.motion.motions`), in DDP and in shooting,
+collocation and MPC to come."""
 
 import numpy as np
 

@@ -61,7 +61,7 @@ def sequential(
     return np.asarray(_table()[np.round(places * (STEPS - 1)).astype(int)])
 
 
-def oklab(srgb: np.ndarray) -> np.ndarray:
+def to_oklab(srgb: np.ndarray) -> np.ndarray:
     """Lightness and two opponent colours (..., 3) of sRGB colours (..., 3) in [0, 1]."""
     linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
     return np.asarray(np.cbrt(linear @ TO_CONES.T) @ TO_LAB.T)
@@ -78,7 +78,7 @@ def from_oklab(lab: np.ndarray) -> np.ndarray:
 @cache
 def _table() -> np.ndarray:
     """The map at STEPS places, equally far apart along the way."""
-    anchors = oklab(np.array(ANCHORS))
+    anchors = to_oklab(np.array(ANCHORS))
     reached = np.cumsum([0.0, *np.linalg.norm(np.diff(anchors, axis=0), axis=1)])
     places = np.linspace(0.0, reached[-1], STEPS)
     table = from_oklab(np.stack([np.interp(places, reached, axis) for axis in anchors.T], axis=-1))

@@ -20,7 +20,7 @@ def compiled(function: F) -> F:
     return _compiled(function, inline=False)
 
 
-def copied(function: F) -> F:
+def inlined(function: F) -> F:
     """The same, copied into each compiled function that calls it instead of called: for what is
     asked for at every turn of a hot loop."""
     return _compiled(function, inline=True)

@@ -225,7 +225,7 @@ class Params(BaseModel):
 
     @field_validator("*")
     @classmethod
-    def _is_an_option(cls, value: Value, info: ValidationInfo) -> Value:
+    def _check_option(cls, value: Value, info: ValidationInfo) -> Value:
         tunable = cls.tunables.get(info.field_name or "")
         if isinstance(tunable, Choice) and value not in tunable.options:
             raise ValueError("is none of its options")
@@ -242,9 +242,9 @@ class Params(BaseModel):
         try:
             return type(self).model_validate(self.model_dump() | dict(changes))
         except ValidationError as error:
-            raise ParameterError("; ".join(map(self._sentence, error.errors()))) from None
+            raise ParameterError("; ".join(map(self._error_message, error.errors()))) from None
 
-    def differing(self, other: Self) -> dict[str, Value]:
+    def changed_from(self, other: Self) -> dict[str, Value]:
         """The values of these parameters that `other` does not share."""
         theirs = other.model_dump()
         return {k: v for k, v in self.model_dump().items() if v != theirs[k]}
@@ -261,7 +261,7 @@ class Params(BaseModel):
         return [tunable.describe(name, defaults[name]) for name, tunable in cls.tunables.items()]
 
     @classmethod
-    def _sentence(cls, error: ErrorDetails) -> str:
+    def _error_message(cls, error: ErrorDetails) -> str:
         name = str(error["loc"][0])
         tunable = cls.tunables[name]
         shown = f"{name} = {str(error['input'])[:80]!s}"

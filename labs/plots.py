@@ -161,7 +161,7 @@ def measured(plot: Plot) -> tuple[str, ...]:
     return (plot.channel,) if isinstance(plot, Readout) else ()
 
 
-def pictured(plot: Plot) -> tuple[str, ...]:
+def field_names(plot: Plot) -> tuple[str, ...]:
     """The channels of `Lab.fields` and `Lab.notes` a plot shows."""
     match plot:
         case Curves(traces=traces):
@@ -179,7 +179,7 @@ def pictured(plot: Plot) -> tuple[str, ...]:
             return ()
 
 
-def may_have_gaps(plot: Plot) -> tuple[str, ...]:
+def fields_with_gaps(plot: Plot) -> tuple[str, ...]:
     """The fields a plot shows in which NaN stands for what has no value."""
     match plot:
         case Curves(traces=traces):

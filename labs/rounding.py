@@ -4,7 +4,7 @@ import math
 from decimal import ROUND_CEILING, Context, Decimal
 
 
-def rounded_up(value: float, digits: int = 2) -> str:
+def round_up(value: float, digits: int = 2) -> str:
     """`value` in so many significant digits, 6 at most, never below it: for what is said to be a
     bound."""
     if not math.isfinite(value):

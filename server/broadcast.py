@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from labs.engine.run import World
-from labs.plots import pictured
+from labs.plots import field_names
 from server.messages import Hello, Status, Telemetry, View
 from server.pacing import MEASURE_EVERY, Pacer
 from server.pipe import HELLO, STATUS, STREAM, Link
@@ -53,7 +53,7 @@ class Broadcast:
         self._link, self._scene, self._controls = link, scene, controls
         self._pacer, self._solver = pacer, solver
         self._world = world = controls.world
-        self._fields = sorted({name for plot in world.lab.plots for name in pictured(plot)})
+        self._fields = sorted({name for plot in world.lab.plots for name in field_names(plot)})
         self._due = dict.fromkeys(("scene", "telemetry", "fields", "status"), 0.0)
         self._sent_run = 0
         self._sent_rows = 0

@@ -247,7 +247,7 @@ def _arguments_of_recording(options: argparse.Namespace) -> dict[str, Any]:
             "seed": _seed(int(about["seed"])),
             "seconds": float(about["covers"]["to"]),
             "events": events,
-            "solution": Solution.from_plain(about["solution"]) if "solution" in about else None,
+            "solution": Solution.from_dict(about["solution"]) if "solution" in about else None,
         }
     except OSError as error:
         raise LabError(f"--replay {path}: {error.strerror}") from None

@@ -84,7 +84,7 @@ class SolverClock:
         self._last = now
         self._active = world.solving and (self.running or self._pending > 0)
         while world.solving and (self._pending or self._is_due(now)):
-            self._mid_iteration = not world.work()
+            self._mid_iteration = not world.iterate_piece()
             if self._pending and not self._mid_iteration:
                 self._pending -= 1
             if time.perf_counter() > until:
@@ -95,7 +95,7 @@ class SolverClock:
         world = self._world
         if not world.lab.has_solver():
             return None
-        first, latest = world.kept.first, world.latest
+        first, latest = world.snapshots.first, world.latest
         return SolverStatus(
             iteration=world.shown.iteration if world.shown else 0,
             latest=latest.iteration if latest else 0,

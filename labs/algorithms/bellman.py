@@ -18,7 +18,7 @@ import numpy as np
 
 from labs.compiled import compiled
 from labs.problems.finite_mdp import FiniteMDP
-from labs.rounding import rounded_up
+from labs.rounding import round_up
 
 TIE_TOLERANCE = 1e-12
 """Relative to max|C| + max|V|: controls this close are equally good, and the present one is
@@ -68,9 +68,7 @@ def convergence_message(mdp: FiniteMDP, V: np.ndarray, change: float, tolerance:
     terms = mdp.U + (1 if mdp.deterministic else mdp.X)
     size = _size(mdp, V) + change
     far = error_bound(mdp.gamma, change, terms * np.finfo(float).eps * size)
-    return (
-        f"No value changed by more than {float(tolerance)}: the limit is within {rounded_up(far)}."
-    )
+    return f"No value changed by more than {float(tolerance)}: the limit is within {round_up(far)}."
 
 
 def error_bound(gamma: float, change: float, rounding: float = 0.0) -> float:

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labs.compiled import compiled, copied
+from labs.compiled import compiled, inlined
 from labs.random_numbers import below, uniform
 
 EPSILON_GREEDY, BOLTZMANN, CONFIDENCE, FOLLOW = range(4)
@@ -41,7 +41,7 @@ class BehaviourPolicy(NamedTuple):
     """(X,) int64: mu, for FOLLOW; empty otherwise."""
 
 
-@copied
+@inlined
 def choose(
     behaviour: BehaviourPolicy, x: int, q: np.ndarray, visits: np.ndarray, random: np.ndarray
 ) -> int:

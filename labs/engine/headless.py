@@ -72,7 +72,7 @@ def _with_changes(
     solution.check_lab(entry.slug)
     before = entry.lab.Params().change(solution.params)
     params = before.change(changes)
-    other = {params.tunables[name].effect for name in params.differing(before)} - {"live"}
+    other = {params.tunables[name].effect for name in params.changed_from(before)} - {"live"}
     return replace(
         solution,
         params=params.model_dump(),

@@ -104,7 +104,7 @@ class World:
         self._start_solver(snapshot)
         if self.solving:
             # Says that the events tell how far the solver went, even if it goes nowhere.
-            self._note(Event(0, "solve", "iterate", 0))
+            self._record_event(Event(0, "solve", "iterate", 0))
         first = self.lab.measure(self.params, self.state)
         scalars = [name for plot in self.lab.plots for name in measured(plot)]
         self.recorder = Recorder(first, scalars, self._capacity)
@@ -123,7 +123,7 @@ class World:
     def change(self, changes: Mapping[str, object]) -> None:
         """New values for some parameters, seen from the next step on. Raises ParameterError."""
         params = self.params.change(changes)
-        changed = params.differing(self.params)
+        changed = params.changed_from(self.params)
         if not changed:
             return
         self.params = params
@@ -132,7 +132,7 @@ class World:
             self.reset()
             return
         for name, value in changed.items():
-            self._note(Event(self.steps, "set", name, value))
+            self._record_event(Event(self.steps, "set", name, value))
         if "solve" in effects:
             self._start_solver(None)
 
@@ -140,7 +140,7 @@ class World:
         """Presses one of the lab's actions."""
         self.lab.check_action(action)
         self._actions.append(action)
-        self._note(Event(self.steps, "press", action))
+        self._record_event(Event(self.steps, "press", action))
 
     def hold(self, handle: str, point: Point | None) -> None:
         """A handle is held at a point [m], or released (None). Raises ParameterError."""
@@ -155,7 +155,7 @@ class World:
             return
         else:
             self._handles[handle] = point
-        self._note(Event(self.steps, "hold", handle, point))
+        self._record_event(Event(self.steps, "hold", handle, point))
 
     def advance(self) -> None:
         """One period of simulated time, unless the world is in trouble or there is none."""
@@ -178,15 +178,15 @@ class World:
     @property
     def latest(self) -> Snapshot | None:
         """The last thing the solver found, since it was started."""
-        return self.kept.last
+        return self.snapshots.last
 
     def iterate(self) -> None:
         """One iteration of the solver, taken into the state: from the latest on, wherever one
         looked back to."""
-        while not self.work():
+        while not self.iterate_piece():
             pass
 
-    def work(self) -> bool:
+    def iterate_piece(self) -> bool:
         """A piece of an iteration, where the solver does it in pieces; whether that ended it."""
         if self._solver is None:
             return True
@@ -201,19 +201,19 @@ class World:
             self._solver = None
         if self.latest and self.shown is not self.latest:
             self._accept(self.latest)
-        snapshot = replace(snapshot, iteration=self._before + snapshot.iteration)
-        self.kept.add(snapshot)
+        snapshot = replace(snapshot, iteration=self._iterations_before + snapshot.iteration)
+        self.snapshots.add(snapshot)
         self._accept(snapshot)
-        self._note(Event(self.steps, "solve", "iterate", 1))
+        self._record_event(Event(self.steps, "solve", "iterate", 1))
         return True
 
     def show(self, iteration: int) -> None:
         """Looks back at an iteration: the nearest kept one not after it. Raises ParameterError."""
-        snapshot = self.kept.at(iteration)
+        snapshot = self.snapshots.at(iteration)
         if snapshot is None:
             raise ParameterError("there is no iteration of the solver to look back at yet")
         self._accept(snapshot)
-        self._note(Event(self.steps, "solve", "show", snapshot.iteration))
+        self._record_event(Event(self.steps, "solve", "show", snapshot.iteration))
 
     def solution(self) -> Solution:
         """What is shown of the solver, to be saved. Raises LabError."""
@@ -229,15 +229,15 @@ class World:
     def _start_solver(self, found: Snapshot | None) -> None:
         """From the present state, which holds what was `found` before."""
         self.solves += 1
-        self.kept = Snapshots()
+        self.snapshots = Snapshots()
         self.shown = found
-        self._before = found.iteration if found else 0
+        self._iterations_before = found.iteration if found else 0
         if found:
-            self.kept.add(found)
+            self.snapshots.add(found)
         has = self.lab.has_solver()
         self._solver = self.lab.solve(self.params, self.state) if has else None
 
-    def _note(self, event: Event) -> None:
+    def _record_event(self, event: Event) -> None:
         last = self.events[-1] if self.events else None
         same = last and (last.step, last.kind, last.name) == (event.step, event.kind, event.name)
         if last and same and event.name == "iterate":
@@ -272,7 +272,7 @@ class World:
             "trouble": self.trouble,
             "versions": versions(),
         }
-        solution = self.loaded.plain() if self.loaded else None
+        solution = self.loaded.to_dict() if self.loaded else None
         return Recording(about, self.recorder.columns, rows, self.recorder.channels(), solution)
 
     def command(self) -> str:
@@ -291,7 +291,7 @@ class World:
             )
         words = ["orclab", "run", self.entry.slug, "--seed", str(self.seed)]
         words += ["--seconds", f"{self.t:.10g}"]
-        for name, value in self.initial.differing(self.lab.Params()).items():
+        for name, value in self.initial.changed_from(self.lab.Params()).items():
             words += ["--set", f"{name}={format_value(value)}"]
         for event in self.events:
             words += format_event(event, self.lab.period)

@@ -44,7 +44,7 @@ class Snapshots:
     def add(self, snapshot: Snapshot) -> None:
         """Keeps one that is later than all before it."""
         self._kept.append(snapshot)
-        self._sizes.append(OVERHEAD + sum(array.nbytes for _, array in leaves(snapshot.data)))
+        self._sizes.append(OVERHEAD + sum(array.nbytes for _, array in flatten(snapshot.data)))
         self._total += self._sizes[-1]
         while len(self._kept) > 2 and self._total > self._most:
             self._thin()
@@ -62,7 +62,7 @@ class Snapshots:
         self._total = sum(self._sizes)
 
 
-def leaves(data: Any, path: str = "") -> Iterator[tuple[str, np.ndarray]]:
+def flatten(data: Any, path: str = "") -> Iterator[tuple[str, np.ndarray]]:
     """Every number, text and array in plain data, as an array, by where it stands: keys, fields
     and places in lists, joined by dots."""
     if data is None:
@@ -77,4 +77,4 @@ def leaves(data: Any, path: str = "") -> Iterator[tuple[str, np.ndarray]]:
         yield path, np.asarray(data)
         return
     for name, value in parts:
-        yield from leaves(value, f"{path}.{name}" if path else name)
+        yield from flatten(value, f"{path}.{name}" if path else name)

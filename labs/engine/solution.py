@@ -20,7 +20,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from labs.engine.record import versions
-from labs.engine.snapshots import leaves
+from labs.engine.snapshots import flatten
 from labs.errors import LabError
 from labs.lab import Snapshot
 from labs.params import Value
@@ -64,7 +64,7 @@ class Solution:
     def of(cls, lab: str, params: Mapping[str, Value], seed: int, snapshot: Snapshot) -> "Solution":
         """What a snapshot holds."""
         about = (snapshot.iteration, snapshot.done, snapshot.progress)
-        return cls(lab, params, seed, *about, dict(leaves(_lasting(snapshot.data))))
+        return cls(lab, params, seed, *about, dict(flatten(_without_durations(snapshot.data))))
 
     def about(self) -> dict[str, Any]:
         """All but the arrays."""
@@ -80,14 +80,14 @@ class Solution:
 
     # Writing ----------------------------------------------------------------------------------
 
-    def plain(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """What the JSON file holds."""
-        return self.about() | {"data": {name: _spelled(a) for name, a in self.arrays.items()}}
+        return self.about() | {"data": {name: _array_to_json(a) for name, a in self.arrays.items()}}
 
     def json(self) -> bytes:
         import orjson  # on demand: a headless run without output needs no writer
 
-        return orjson.dumps(self.plain())
+        return orjson.dumps(self.to_dict())
 
     def npz(self) -> bytes:
         data = io.BytesIO()
@@ -106,21 +106,23 @@ class Solution:
         """What a file holds, JSON or NPZ. Raises LabError."""
         try:
             if data.startswith(b"PK"):
-                arrays = _unpacked(data)
+                arrays = _load_npz(data)
                 about = json.loads(str(arrays.pop("about")))
                 return cls._checked(about, arrays)
             import orjson  # on demand, as for writing
 
-            return cls.from_plain(orjson.loads(data))
+            return cls.from_dict(orjson.loads(data))
         except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError) as error:
-            raise LabError(f"this is no solution saved by orclab ({_short(error)})") from None
+            raise LabError(f"this is no solution saved by orclab ({_brief(error)})") from None
         except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError) as error:
-            raise LabError(f"this NPZ file cannot be read ({_short(error)})") from None
+            raise LabError(f"this NPZ file cannot be read ({_brief(error)})") from None
 
     @classmethod
-    def from_plain(cls, found: Mapping[str, Any]) -> "Solution":
-        """What `plain` gave. Raises LabError, ValueError, KeyError or TypeError."""
-        arrays = {str(name): _read(name, spelled) for name, spelled in found["data"].items()}
+    def from_dict(cls, found: Mapping[str, Any]) -> "Solution":
+        """What `to_dict` gave. Raises LabError, ValueError, KeyError or TypeError."""
+        arrays = {
+            str(name): _array_from_json(name, spelled) for name, spelled in found["data"].items()
+        }
         return cls._checked(found, arrays)
 
     @classmethod
@@ -151,17 +153,19 @@ class Solution:
 
         Names, kinds and ranks have to be those of `own`, and shapes too, but along axes that
         differ among `own`: those grow from iteration to iteration. Raises LabError."""
-        shapes = [{name: a.shape for name, a in leaves(_lasting(one.data))} for one in own]
-        wanted = dict(leaves(_lasting(own[0].data)))
+        shapes = [
+            {name: a.shape for name, a in flatten(_without_durations(one.data))} for one in own
+        ]
+        wanted = dict(flatten(_without_durations(own[0].data)))
         if missing := sorted(wanted.keys() - self.arrays.keys()):
-            raise LabError(f"the solution lacks {_listed(missing)}: it is of another version")
+            raise LabError(f"the solution lacks {_joined(missing)}: it is of another version")
         if unknown := sorted(self.arrays.keys() - wanted.keys()):
-            raise LabError(f"the solution has {_listed(unknown)}, of which this lab knows nothing")
+            raise LabError(f"the solution has {_joined(unknown)}, of which this lab knows nothing")
         fitted = {
-            name: _like(name, self.arrays[name], model, [s[name] for s in shapes if name in s])
+            name: _cast_like(name, self.arrays[name], model, [s[name] for s in shapes if name in s])
             for name, model in wanted.items()
         }
-        data = _rebuilt(_lasting(own[0].data), "", fitted)
+        data = _unflatten(_without_durations(own[0].data), "", fitted)
         assert isinstance(data, dict)
         # A solver's durations begin anew.
         return data | ({"seconds": {}} if "seconds" in own[0].data else {})
@@ -171,11 +175,11 @@ class Solution:
         return Snapshot(self.iteration, self.fitted(own), self.done, self.progress)
 
 
-def _lasting(data: Mapping[str, Any]) -> dict[str, Any]:
+def _without_durations(data: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in data.items() if name != "seconds"}
 
 
-def _like(
+def _cast_like(
     name: str, array: np.ndarray, model: np.ndarray, shapes: Sequence[tuple[int, ...]]
 ) -> np.ndarray:
     """The array with the type and layout of the lab's own."""
@@ -202,11 +206,11 @@ def _like(
     return cast
 
 
-def _rebuilt(model: Any, path: str, arrays: Mapping[str, np.ndarray]) -> Any:
+def _unflatten(model: Any, path: str, arrays: Mapping[str, np.ndarray]) -> Any:
     """Plain data in the form of `model` with these values in it."""
 
     def part(name: object, value: Any) -> Any:
-        return _rebuilt(value, f"{path}.{name}" if path else str(name), arrays)
+        return _unflatten(value, f"{path}.{name}" if path else str(name), arrays)
 
     if model is None:
         return None
@@ -223,7 +227,7 @@ def _rebuilt(model: Any, path: str, arrays: Mapping[str, np.ndarray]) -> Any:
     return type(model)(arrays[path].item())
 
 
-def _spelled(array: np.ndarray) -> dict[str, Any]:
+def _array_to_json(array: np.ndarray) -> dict[str, Any]:
     """An array in JSON, bit for bit; of a complex number, its two parts."""
     if array.dtype.kind == "U":
         return {"dtype": "str", "shape": array.shape, "values": array.ravel().tolist()}
@@ -232,7 +236,7 @@ def _spelled(array: np.ndarray) -> dict[str, Any]:
     return {"dtype": array.dtype.name, "shape": array.shape, "values": parts.tolist()}
 
 
-def _read(name: str, spelled: Mapping[str, Any]) -> np.ndarray:
+def _array_from_json(name: str, spelled: Mapping[str, Any]) -> np.ndarray:
     shape, values, dtype = tuple(spelled["shape"]), spelled["values"], spelled["dtype"]
     flat: Iterable[Any] = values
     if dtype == "str":
@@ -250,7 +254,7 @@ def _read(name: str, spelled: Mapping[str, Any]) -> np.ndarray:
     return array.reshape(shape)
 
 
-def _unpacked(data: bytes) -> dict[str, np.ndarray]:
+def _load_npz(data: bytes) -> dict[str, np.ndarray]:
     """The arrays of an NPZ file, none of which may be larger than it says or hold objects."""
     with zipfile.ZipFile(io.BytesIO(data)) as packed:
         members = packed.infolist()
@@ -274,9 +278,9 @@ def _array(content: bytes) -> np.ndarray:
     return array
 
 
-def _listed(names: Sequence[str]) -> str:
+def _joined(names: Sequence[str]) -> str:
     return ", ".join(names[:5]) + (" and more" if len(names) > 5 else "")
 
 
-def _short(error: Exception) -> str:
+def _brief(error: Exception) -> str:
     return f"{type(error).__name__}: {error}"[:200]

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labs.compiled import compiled, copied
+from labs.compiled import compiled, inlined
 from labs.problems.finite_mdp import FiniteMDP
 from labs.random_numbers import below, uniform
 
@@ -106,7 +106,7 @@ def _sample(task: EpisodicTask, x: int, u: int, random: np.ndarray) -> int:
     return int(np.searchsorted(task.cumulative[u, x], uniform(random), "right"))
 
 
-@copied
+@inlined
 def record(
     task: EpisodicTask, learner: Learner, episode: int, x: int, u: int, discount: float
 ) -> float:

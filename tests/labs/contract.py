@@ -264,7 +264,7 @@ def check(world: World) -> None:
     assert all(np.isfinite(a).all() for a in numbers(state)), "the state is finite"
     for name, value in lab.measure(params, state).items():
         assert np.isfinite(value).all(), f"{name} is finite"
-    gaps = {name for plot in lab.plots for name in plots.may_have_gaps(plot)}
+    gaps = {name for plot in lab.plots for name in plots.fields_with_gaps(plot)}
     for name, value in lab.fields(params, state).items():
         assert (np.isfinite(value) | (name in gaps) & np.isnan(value)).all(), f"{name} is finite"
     for name, text in lab.notes(params, state).items():

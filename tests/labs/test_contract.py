@@ -16,7 +16,7 @@ from labs.engine.catalog import Entry
 from labs.engine.events import Event
 from labs.engine.headless import run
 from labs.engine.run import World
-from labs.engine.snapshots import leaves
+from labs.engine.snapshots import flatten
 from labs.engine.solution import Solution
 from labs.errors import ParameterError
 from labs.lab import Action, Inputs, Snapshot, State
@@ -162,14 +162,14 @@ def test_looking_back_shows_what_was(entry: Entry) -> None:
     world, states = iterated(entry)
     for i in (*reversed(range(len(states))), 0, len(states) - 1):
         for _ in range(2):
-            world.show(world.kept.iterations[i])
+            world.show(world.snapshots.iterations[i])
             assert same(replace(world.state, seconds={}), states[i]), f"iteration {i + 1}"
 
 
 @solvers
 def test_a_solver_counts_its_iterations_and_says_why_it_ends(entry: Entry) -> None:
     world, states = iterated(entry)
-    assert world.kept.iterations == list(range(1, len(states) + 1))
+    assert world.snapshots.iterations == list(range(1, len(states) + 1))
     last = world.latest
     assert last is not None
     assert bool(last.done) == (not world.solving)
@@ -180,14 +180,16 @@ def test_a_solver_counts_its_iterations_and_says_why_it_ends(entry: Entry) -> No
 def test_a_snapshot_is_plain_deterministic_and_never_written_into(entry: Entry) -> None:
     """Its durations stand under "seconds" alone; all else is the same each time."""
     world, _ = iterated(entry)
-    before = [copy.deepcopy(_lasting(world.kept.at(i))) for i in world.kept.iterations]
+    before = [
+        copy.deepcopy(_without_durations(world.snapshots.at(i))) for i in world.snapshots.iterations
+    ]
     advance(world, 20)
     again, _ = iterated(entry)
-    for i, was in zip(world.kept.iterations, before, strict=True):
+    for i, was in zip(world.snapshots.iterations, before, strict=True):
         assert all(np.isfinite(a).all() for a in numbers(was)), "a snapshot is finite"
-        assert same(_lasting(world.kept.at(i)), was)
-        assert same(_lasting(again.kept.at(i)), was)
-        assert not {"about", "file"} & {name for name, _ in leaves(was)}, "names of the files"
+        assert same(_without_durations(world.snapshots.at(i)), was)
+        assert same(_without_durations(again.snapshots.at(i)), was)
+        assert not {"about", "file"} & {name for name, _ in flatten(was)}, "names of the files"
 
 
 @solvers
@@ -206,7 +208,7 @@ def test_a_solution_is_saved_and_taken_up_again(entry: Entry, form: str) -> None
         check(world)
 
 
-def _lasting(snapshot: Snapshot | None) -> dict[str, Any]:
+def _without_durations(snapshot: Snapshot | None) -> dict[str, Any]:
     assert snapshot is not None
     return {name: value for name, value in snapshot.data.items() if name != "seconds"}
 
@@ -224,7 +226,7 @@ def test_plots_name_real_channels(entry: Entry) -> None:
     assert not set(noted) & set(pictured)
     for plot in lab.plots:
         known = noted if isinstance(plot, Note) else pictured
-        assert set(plots.pictured(plot)) <= set(known), plot
+        assert set(plots.field_names(plot)) <= set(known), plot
         match plot:
             case TimeSeries(unit=unit, lines=lines, select=select):
                 assert lines, plot

@@ -176,11 +176,11 @@ def test_a_change_changes_all_or_nothing() -> None:
 
 
 def test_differing_names_what_differs() -> None:
-    assert Sample().change({"kp": 5.0, "limits": False}).differing(Sample()) == {
+    assert Sample().change({"kp": 5.0, "limits": False}).changed_from(Sample()) == {
         "kp": 5.0,
         "limits": False,
     }
-    assert Sample().differing(Sample()) == {}
+    assert Sample().changed_from(Sample()) == {}
 
 
 def test_a_bare_field_is_refused_when_the_class_is_made() -> None:

@@ -6,7 +6,7 @@ import hypothesis.strategies as st
 import pytest
 from hypothesis import given
 
-from labs.rounding import rounded_up
+from labs.rounding import round_up
 
 
 @pytest.mark.parametrize(
@@ -25,10 +25,10 @@ from labs.rounding import rounded_up
     ],
 )
 def test_a_few_numbers(value: float, digits: int, text: str) -> None:
-    assert rounded_up(value, digits) == text
+    assert round_up(value, digits) == text
 
 
 @given(st.floats(1e-300, 1e300), st.integers(1, 6))
 def test_never_below_and_less_than_a_unit_above(value: float, digits: int) -> None:
-    said, exact = Decimal(rounded_up(value, digits)), Decimal(value)
+    said, exact = Decimal(round_up(value, digits)), Decimal(value)
     assert exact <= said < exact * (1 + 10 * Decimal(10) ** -digits)

@@ -46,7 +46,7 @@ def replayed(about: dict[str, Any]) -> World:
         seed=about["seed"],
         seconds=about["covers"]["to"],
         events=events_of(about),
-        solution=Solution.from_plain(about["solution"]) if "solution" in about else None,
+        solution=Solution.from_dict(about["solution"]) if "solution" in about else None,
     )
 
 
@@ -94,7 +94,7 @@ def test_steps_that_are_owed_end_with_their_solver() -> None:
     assert world.latest is None
     clock.dispatch("step", count=3)
     clock.iterate(1.0, until=float("inf"))
-    assert world.kept.iterations == [1, 2, 3]
+    assert world.snapshots.iterations == [1, 2, 3]
 
 
 def test_an_iteration_in_pieces_is_one_iteration() -> None:
@@ -111,7 +111,7 @@ def test_an_iteration_in_pieces_is_one_iteration() -> None:
     clock.dispatch("show", iteration=1)
     for _ in range(3):
         clock.iterate(1.0, until=0.0)
-    assert world.shown is world.kept.at(1), "what is looked at stays, in the midst of another"
+    assert world.shown is world.snapshots.at(1), "what is looked at stays, in the midst of another"
     clock.dispatch("pace", pace=1.0)
     clock.dispatch("run")
     for _ in range(9):

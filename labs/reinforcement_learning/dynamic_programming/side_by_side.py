@@ -20,7 +20,7 @@ import numpy as np
 from labs.algorithms import policy_evaluation, policy_iteration, value_iteration
 from labs.algorithms.bellman import NO_BOUND, Sweep
 from labs.problems.finite_mdp import FiniteMDP, random_policy
-from labs.rounding import rounded_up
+from labs.rounding import round_up
 
 ITERATION_METHODS = {
     "evaluation": "Policy evaluation",
@@ -91,7 +91,7 @@ class Iterates:
         ]
         if short:
             return " ".join(short)
-        left = f"the largest distance left is {rounded_up(self.errors[-1].max())}."
+        left = f"the largest distance left is {round_up(self.errors[-1].max())}."
         if any(NO_BOUND in done for done in self.done):
             return f"All four iterations have stopped; {NO_BOUND}: {left}"
         return f"All four iterations have converged: {left}"

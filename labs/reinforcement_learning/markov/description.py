@@ -4,7 +4,7 @@ import numpy as np
 
 from labs.algorithms.markov_chain import CommunicatingClass, can_reach, is_irreducible
 from labs.reinforcement_learning.markov.reward_process import RewardProcess
-from labs.rounding import rounded_up
+from labs.rounding import round_up
 
 TIE = 1e-9
 """Values that differ by less are equal, relative to the largest of them and of the costs."""
@@ -148,7 +148,7 @@ def _one_end(names: tuple[str, ...], modes: np.ndarray, end: CommunicatingClass)
     elif second < 1e-6:
         speed = "all others are 0 to six digits: the start is soon forgotten altogether"
     elif second > 0.999:
-        short = rounded_up(max(1.0 - second, ROUNDING))
+        short = round_up(max(1.0 - second, ROUNDING))
         speed = f"the next is within {short} of 1: the start is forgotten very slowly"
     else:
         half = np.log(0.5) / np.log(second)

@@ -251,10 +251,10 @@ def test_a_solver_started_anew_forgets_what_it_found() -> None:
     solves = world.solves
     world.change({"guess": 16.0})
     assert world.solves == solves + 1
-    assert (len(world.kept), world.shown, world.latest) == (0, None, None)
+    assert (len(world.snapshots), world.shown, world.latest) == (0, None, None)
     assert world.state.root == pytest.approx(3.0), "until there is something better"
     world.iterate()
-    assert world.kept.iterations == [1]
+    assert world.snapshots.iterations == [1]
 
 
 def test_a_headless_run_looks_back_at_what_it_solved_to_the_end() -> None:
@@ -429,7 +429,7 @@ def test_whatever_is_done_can_be_done_again(deeds: list[tuple[str, Any]], seed: 
     )
     assert same(replayed, world)
     assert replayed.solving == world.solving
-    assert replayed.kept.iterations == world.kept.iterations
+    assert replayed.snapshots.iterations == world.snapshots.iterations
 
 
 def test_there_and_back_within_a_step_starts_the_solver_again_in_the_replay_too() -> None:

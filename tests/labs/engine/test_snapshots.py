@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from labs.engine.snapshots import OVERHEAD, Snapshots, leaves
+from labs.engine.snapshots import OVERHEAD, Snapshots, flatten
 from labs.lab import Snapshot
 
 
@@ -65,7 +65,7 @@ def test_leaves_are_named_by_the_way_to_them() -> None:
         "no": None,
         "n": {"k": "t"},
     }
-    found = dict(leaves(data))
+    found = dict(flatten(data))
     assert list(found) == ["x", "pair.a", "pair.b.0", "pair.b.1", "n.k"]
     assert found["pair.a"] == 1.5
     assert found["n.k"] == "t"

@@ -13,7 +13,7 @@ from labs.engine.catalog import find
 from labs.engine.events import Event, events_of
 from labs.engine.headless import run
 from labs.engine.run import World
-from labs.engine.snapshots import leaves
+from labs.engine.snapshots import flatten
 from labs.engine.solution import MAX_ARRAYS, MAX_UNPACKED, Solution
 from labs.errors import LabError, ParameterError
 from labs.lab import Snapshot
@@ -63,7 +63,7 @@ def test_everything_comes_back_bit_for_bit(form: str) -> None:
     back = snapshot.data
     assert back["seconds"] == {}, "durations stay at home"
     assert list(back) == list(data)
-    before, after = (dict(leaves({**d, "seconds": {}})) for d in (data, back))
+    before, after = (dict(flatten({**d, "seconds": {}})) for d in (data, back))
     for name, array in before.items():
         assert after[name].dtype == array.dtype, name
         assert after[name].shape == array.shape, name
@@ -154,7 +154,7 @@ def test_a_solution_of_another_lab_is_refused() -> None:
 
 
 def plain(**changes: Any) -> bytes:
-    return json.dumps(descended().solution().plain() | changes).encode()
+    return json.dumps(descended().solution().to_dict() | changes).encode()
 
 
 def packed(**members: bytes) -> bytes:
@@ -228,10 +228,10 @@ def test_a_run_begins_with_its_solution_and_goes_on_from_it() -> None:
     assert world.params.model_dump()["rate"] == 0.02
     assert world.state.path.tolist() == first.state.path.tolist()
     assert world.recording().channels["best"].tolist() == [first.state.best]
-    assert world.kept.iterations == [20]
+    assert world.snapshots.iterations == [20]
     first.iterate()
     world.iterate()
-    assert world.kept.iterations == [20, 21]
+    assert world.snapshots.iterations == [20, 21]
     assert world.state.path.tolist() == first.state.path.tolist()
 
 
@@ -273,7 +273,7 @@ def test_a_run_after_loading_is_replayed_from_its_recording() -> None:
         seed=about["seed"],
         seconds=about["covers"]["to"],
         events=events_of(about),
-        solution=Solution.from_plain(about["solution"]),
+        solution=Solution.from_dict(about["solution"]),
     )
     assert again.recording().json() == world.recording().json()
     assert world.seed == 4

@@ -15,7 +15,7 @@ from labs.appendix.integration.params import (
 from labs.errors import ParameterError
 from labs.models.pendulums import pendulum
 from labs.params import Value
-from labs.plots import measured, pictured
+from labs.plots import field_names, measured
 from labs.scene import NullScene
 from tests.labs.appendix.integration.runs import (
     EXPERIMENTS,
@@ -215,4 +215,4 @@ def test_every_channel_shown_is_measured() -> None:
     fields = set(LAB.fields(world.params, world.state))
     for plot in LAB.plots:
         assert set(measured(plot)) <= channels
-        assert set(pictured(plot)) <= fields
+        assert set(field_names(plot)) <= fields

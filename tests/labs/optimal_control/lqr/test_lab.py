@@ -10,7 +10,7 @@ from labs.optimal_control.lqr.comparison import HORIZON_COUNT
 from labs.optimal_control.lqr.lab import PUSH_STEPS, Lqr
 from labs.optimal_control.lqr.params import LqrParams
 from labs.optimal_control.lqr.region_of_attraction import GRID_POINTS, SYSTEM_CODES
-from labs.plots import measured, pictured
+from labs.plots import field_names, measured
 from labs.scene import NullScene
 from labs.tasks.regulation.linear_systems import linear_system
 from tests.labs.optimal_control.lqr.simulation import (
@@ -111,7 +111,7 @@ def test_off_its_rail_the_world_stops_and_says_so() -> None:
 def test_every_channel_is_plotted_or_read_out() -> None:
     params = LqrParams()
     state = solved(params)
-    shown = {name for plot in Lqr.plots for name in (*measured(plot), *pictured(plot))}
+    shown = {name for plot in Lqr.plots for name in (*measured(plot), *field_names(plot))}
     given = {**LAB.measure(params, state), **LAB.fields(params, state)}
     assert shown - {"to_end"} == set(given)
     assert "to_end" in LAB.measure(params.change({"policy": "window"}), state)

@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 
 from labs.models.plant import plant
-from labs.plots import measured, pictured
+from labs.plots import field_names, measured
 from tests.labs.reactive_control.joint_control.runs import LAB, final_state, gravity, parameters
 
 
@@ -34,4 +34,4 @@ def test_plots_name_real_channels() -> None:
     measure, fields = LAB.measure(params, rest), LAB.fields(params, rest)
     for plot in LAB.plots:
         assert set(measured(plot)) <= set(measure)
-        assert set(pictured(plot)) <= set(fields)
+        assert set(field_names(plot)) <= set(fields)

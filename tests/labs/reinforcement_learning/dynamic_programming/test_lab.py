@@ -13,7 +13,7 @@ from labs.engine.headless import run
 from labs.engine.run import World
 from labs.errors import LabError
 from labs.params import Value
-from labs.rounding import rounded_up
+from labs.rounding import round_up
 from labs.scene import NullScene
 from labs.tasks.grid_world.map import MAPS, GridWorld
 from labs.tasks.grid_world.picture import board
@@ -158,9 +158,9 @@ def test_without_discount_a_small_change_is_no_convergence() -> None:
     assert world.latest is not None
     assert world.latest.done == (
         "All four iterations have stopped; with gamma = 1 that bounds no distance to the limit: "
-        f"the largest distance left is {rounded_up(error)}."
+        f"the largest distance left is {round_up(error)}."
     )
-    assert float(rounded_up(error)) >= error
+    assert float(round_up(error)) >= error
     lines = world.lab.notes(world.params, world.state)["account"].splitlines()
     assert lines[0].endswith(
         "by more than 0.1; with gamma = 1 that bounds no distance to the limit."

@@ -21,7 +21,7 @@ from labs.reinforcement_learning.dynamic_programming.side_by_side import (
     passes,
     progress,
 )
-from labs.rounding import rounded_up
+from labs.rounding import round_up
 from tests.labs.algorithms.random_mdps import random_mdp
 
 SETTINGS = IterationSettings(3, 1e-8)
@@ -57,7 +57,7 @@ def test_each_goes_as_if_it_were_alone() -> None:
         np.testing.assert_array_equal(last.backups[1 : len(sweeps) + 1, i], made)
     assert last.stop_reason == (
         "All four iterations have converged: the largest distance left is "
-        f"{rounded_up(last.errors[-1].max())}."
+        f"{round_up(last.errors[-1].max())}."
     )
     assert not at.stop_reason
 

@@ -48,7 +48,7 @@ def measured(world: World) -> dict[str, np.ndarray]:
     return {k: np.asarray(v) for k, v in LAB.measure(params_of(world), world.state).items()}
 
 
-def pictured(world: World) -> dict[str, np.ndarray]:
+def field_names(world: World) -> dict[str, np.ndarray]:
     return dict(LAB.fields(params_of(world), world.state))
 
 
@@ -81,7 +81,7 @@ def test_where_the_weeks_go(setting: Mapping[str, Value]) -> None:
 @ARTICLE.verify("Round and round")
 def test_round_and_round(setting: Mapping[str, Value]) -> None:
     world = walked(setting, 11)
-    fields = pictured(world)
+    fields = field_names(world)
     found = fields["re"] + 1j * fields["im"]
     for root in (1, 1j, -1, -1j):
         assert np.abs(found - root).min() < 1e-12
@@ -113,7 +113,7 @@ def test_one_way_doors(setting: Mapping[str, Value]) -> None:
         desks += int(at_desk)
     # Within three standard deviations of 60 %.
     assert abs(desks - 0.6 * runs) < 3 * np.sqrt(runs * 0.6 * 0.4)
-    fields = pictured(world)
+    fields = field_names(world)
     found = fields["re"] + 1j * fields["im"]
     assert (np.abs(found - 1.0) < 1e-9).sum() == 2
     assert (np.abs(found + 1.0) < 1e-9).sum() == 1
@@ -133,7 +133,7 @@ def test_myopic_or_far_sighted(setting: Mapping[str, Value]) -> None:
     assert V(0.978)[0] < V(0.978)[3]
     for gamma in (0.979, setting["gamma"]):
         assert V(float(gamma))[3] < V(float(gamma))[0]
-    fields = pictured(run("markov", setting, seconds=0.0))
+    fields = field_names(run("markov", setting, seconds=0.0))
     means = fields["means"]
     np.testing.assert_allclose(means[0], V(0.0), atol=1e-12)
     assert (GAMMAS[0], GAMMAS[-1]) == (0.0, 1.0)
@@ -155,14 +155,14 @@ def test_no_end_no_sum(setting: Mapping[str, Value]) -> None:
     process = process_of(world)
     assert np.linalg.matrix_rank(np.eye(6) - process.P) == 5
     assert "value" not in measured(world)
-    assert np.isnan(pictured(world)["exact"]).all()
-    assert len(pictured(world)["error"]) == 0
+    assert np.isnan(field_names(world)["exact"]).all()
+    assert len(field_names(world)["error"]) == 0
 
 
 @ARTICLE.verify("The last week")
 def test_the_last_week(setting: Mapping[str, Value]) -> None:
     world = run("markov", setting, seconds=0.0)
-    fields, P = pictured(world), process_of(world).P
+    fields, P = field_names(world), process_of(world).P
     np.testing.assert_allclose(fields["exact"][[0, 4]], [-4.93, 5.32], atol=5e-3)
     np.testing.assert_allclose(fields["V"], fields["exact"], atol=1e-8)
     assert fields["exact"][5] == 0.0
@@ -175,21 +175,21 @@ def test_the_last_week(setting: Mapping[str, Value]) -> None:
 def test_how_long_will_a_gambler_last(setting: Mapping[str, Value]) -> None:
     world = run("markov", setting, seconds=0.0)
     states = process_of(world).table.states
-    V = dict(zip(states, pictured(world)["exact"], strict=True))
+    V = dict(zip(states, field_names(world)["exact"], strict=True))
     expected = {"2 coins": 4.0, "3 coins": 3.0, "1 coin": 3.0, "Broke": 0.0, "Rich": 0.0}
     assert pytest.approx(expected) == V
     far = process_of(world).long_run
-    assert pictured(world)["far"][states.index("Broke")] == pytest.approx(0.5)
+    assert field_names(world)["far"][states.index("Broke")] == pytest.approx(0.5)
     assert far[states.index("3 coins"), states.index("Broke")] == pytest.approx(0.25)
 
 
 @ARTICLE.verify("Never mend a running machine?")
 def test_never_mend_a_running_machine(setting: Mapping[str, Value]) -> None:
-    Q = pictured(run("markov", setting, seconds=0.0))["Q"]
+    Q = field_names(run("markov", setting, seconds=0.0))["Q"]
     expected = [[35.9, 36.3], [49.1, 37.5], [60.0, 46.2]]
     np.testing.assert_allclose(Q, expected, atol=0.051)
     assert Q.argmin(axis=1).tolist() == [0, 1, 1]
-    myopic = pictured(run("markov", {**setting, "gamma": 0.4}, seconds=0.0))["Q"]
+    myopic = field_names(run("markov", {**setting, "gamma": 0.4}, seconds=0.0))["Q"]
     assert myopic.argmin(axis=1).tolist() == [0, 0, 1]
 
 
@@ -355,8 +355,8 @@ def test_a_snapshot_alone_shows_its_iteration() -> None:
 
 
 def test_every_state_has_a_curve_and_the_chosen_one_is_shown_once_more() -> None:
-    fields = pictured(begun({"chain": "machine", "source": "12"}))
+    fields = field_names(begun({"chain": "machine", "source": "12"}))
     assert fields["means"].shape == (len(GAMMAS), 3)
     np.testing.assert_array_equal(fields["mean"], fields["means"][:, 2], "the last, beyond it")
-    chosen = pictured(begun({"source": "4"}))
+    chosen = field_names(begun({"source": "4"}))
     np.testing.assert_array_equal(chosen["mean"], chosen["means"][:, 3])

@@ -176,7 +176,9 @@ def test_bellmans_equation_and_the_bound_of_its_iteration(P: np.ndarray, gamma: 
     assert sweeps[-1].done.startswith("V is exact")
     assert [bool(s.done) for s in sweeps[:-1]] == [False] * (len(sweeps) - 1)
     last = sweeps[-1]
-    assert (last.errors <= last.bounds + 1e-12).all()
+    # Each sweep rounds the few terms of a sum as large as V; gamma forgets what was rounded before.
+    rounding = (len(P) + 2) * np.finfo(float).eps * np.abs(exact.V).max() / (1.0 - gamma)
+    assert (last.errors <= last.bounds + rounding).all()
     assert last.errors[-1] <= TOLERANCE * np.abs(exact.V).max()
     assert np.abs(last.V - exact.V).max() == last.errors[-1]
     assert len(last.errors) == len(sweeps) + 1

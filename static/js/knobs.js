@@ -40,7 +40,7 @@ export class Knobs {
     const step = { ArrowUp: 1, ArrowDown: -1 }[event.key];
     if (!step || entry.tunable.kind !== "knob") return;
     event.preventDefault();
-    const value = nudged(entry.tunable, this.values[entry.tunable.name], step);
+    const value = stepped(entry.tunable, this.values[entry.tunable.name], step);
     write(entry, value);
     this.commit(entry, value);
   }
@@ -107,7 +107,7 @@ function typed({ tunable }) {
 }
 
 // The value a little further along the slider.
-function nudged({ low, high, step, scale }, value, direction) {
+function stepped({ low, high, step, scale }, value, direction) {
   if (scale === "log" && value > 0) {
     const factor = Number((value * 1.1 ** direction).toPrecision(3));
     return Math.min(high, Math.max(low, factor));

@@ -120,7 +120,7 @@ session.addEventListener("phase", ({ detail: { phase, text } }) => {
     if (live && text) toast(text);
   } else {
     stage.hold(true);
-    const buttons = phase === "lost" ? {} : phase === "ended" ? { Continue: () => session.hurry() } : retry;
+    const buttons = phase === "lost" ? {} : phase === "ended" ? { Continue: () => session.retryNow() } : retry;
     const more = phase === "full" ? " This page asks again every ten seconds." : "";
     stage.say(text + more, { warn: true, buttons });
   }

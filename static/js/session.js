@@ -22,10 +22,10 @@ export class Session extends EventTarget {
     this.closed = false;
     this.frame.addEventListener("load", () => {
       this.sceneLoaded = this.info !== null;
-      this.settle();
+      this.goLive();
     });
-    addEventListener("online", () => this.hurry());
-    document.addEventListener("visibilitychange", () => this.hurry());
+    addEventListener("online", () => this.retryNow());
+    document.addEventListener("visibilitychange", () => this.retryNow());
     addEventListener("pagehide", () => this.leave());
     addEventListener("pageshow", (event) => event.persisted && this.create());
     setInterval(() => this.checkSilence(), 2000);
@@ -37,12 +37,12 @@ export class Session extends EventTarget {
     this.drop();
     this.end();
     this.closed = this.ended = false;
-    this.sceneLoaded = this.told = this.live = false;
+    this.sceneLoaded = this.statusReceived = this.live = false;
     this.restore = news !== "" || this.want.running !== null;
     this.news = news;
-    this.tell("phase", { phase: "worker", text: news });
+    this.emit("phase", { phase: "worker", text: news });
     const { params, link, seed } = this.want;
-    const waiting = setInterval(() => this.tellPreparing(), PATIENCE);
+    const waiting = setInterval(() => this.reportPreparing(), PATIENCE);
     const { status, data } = await request("POST", "/api/sessions", {
       lab: this.lab.slug, params, link, seed, view: this.view(),
     });
@@ -50,31 +50,31 @@ export class Session extends EventTarget {
     if (this.closed) return;
     if (status === 201) return this.begin(data);
     if (status === 503) {
-      this.tell("phase", { phase: "full", text: data.error });
+      this.emit("phase", { phase: "full", text: data.error });
       this.timer = setTimeout(() => this.create(this.news), FULL_RETRY);
     } else if (status === 0 || status >= 502) {
-      this.tell("phase", { phase: "lost", text: "The server does not answer. Trying again …" });
+      this.emit("phase", { phase: "lost", text: "The server does not answer. Trying again …" });
       this.timer = setTimeout(() => this.create(this.news), this.delay());
     } else if (status === 422 && Object.keys({ ...params, ...link }).length) {
       this.want = { ...this.want, params: {}, link: {} };
-      this.tell("refused", data.error);
+      this.emit("refused", data.error);
       this.create(news);
     } else {
-      this.tell("phase", { phase: "failed", text: data.error });
+      this.emit("phase", { phase: "failed", text: data.error });
     }
   }
 
   // A server started for the first time has more to do than to start a worker.
-  async tellPreparing() {
+  async reportPreparing() {
     const { data } = await request("GET", "/healthz");
-    if (data.preparing && !this.info && !this.closed) this.tell("preparing");
+    if (data.preparing && !this.info && !this.closed) this.emit("preparing");
   }
 
   begin(info) {
     this.info = info;
     this.worker = null;
     this.tries = 0;
-    this.tell("phase", { phase: "robot", text: "" });
+    this.emit("phase", { phase: "robot", text: "" });
     this.showScene();
     this.listen();
   }
@@ -95,9 +95,9 @@ export class Session extends EventTarget {
       this.heard = performance.now();
       const message = JSON.parse(event.data);
       if (message.type === "status") this.noteStatus(message);
-      if (message.type === "hello") this.meet(message.worker);
-      this.tell(message.type, message);
-      if (message.type === "notice" && message.state === "ended") this.rest(message.text);
+      if (message.type === "hello") this.noteWorker(message.worker);
+      this.emit(message.type, message);
+      if (message.type === "notice" && message.state === "ended") this.noteEnded(message.text);
     };
     socket.onclose = () => {
       if (socket === this.socket) this.reconnect();
@@ -105,7 +105,7 @@ export class Session extends EventTarget {
   }
 
   // A worker that took over has a scene of its own; one that says hello again has not.
-  meet(worker) {
+  noteWorker(worker) {
     if (this.worker && worker !== this.worker) this.showScene();
     this.worker = worker;
   }
@@ -129,15 +129,15 @@ export class Session extends EventTarget {
       this.want = { params, link: {}, seed, speed, running, solver: status.solver };
     }
     this.tries = 0;
-    this.told = true;
-    this.settle();
+    this.statusReceived = true;
+    this.goLive();
   }
 
   // Live once both the stream has spoken and the scene has loaded.
-  settle() {
-    if (this.live || !this.told || !this.sceneLoaded) return;
+  goLive() {
+    if (this.live || !this.statusReceived || !this.sceneLoaded) return;
     this.live = true;
-    this.tell("phase", { phase: "live", text: this.news });
+    this.emit("phase", { phase: "live", text: this.news });
     this.news = "";
   }
 
@@ -145,8 +145,8 @@ export class Session extends EventTarget {
     clearTimeout(this.timer);
     this.drop();
     if (this.closed) return;
-    this.told = this.live = false;
-    this.tell("phase", { phase: "lost", text: "The connection was lost. Trying again …" });
+    this.statusReceived = this.live = false;
+    this.emit("phase", { phase: "lost", text: "The connection was lost. Trying again …" });
     const { status } = await request("GET", `/api/sessions/${this.info.id}`);
     if (this.closed || this.socket) return;
     if (status === 200 && this.tries < 1) {
@@ -155,17 +155,17 @@ export class Session extends EventTarget {
     } else if (status === 404 && document.visibilityState === "visible") {
       this.create("The session had ended. A new one goes on with your parameters.");
     } else if (status === 404) {
-      this.rest("The session has ended.");
+      this.noteEnded("The session has ended.");
     } else {
       this.timer = setTimeout(() => (status === 200 ? this.listen() : this.reconnect()), this.delay());
     }
   }
 
   // Nobody uses the session: no new one until somebody does.
-  rest(text) {
+  noteEnded(text) {
     this.ended = true;
     this.drop();
-    this.tell("phase", { phase: "ended", text });
+    this.emit("phase", { phase: "ended", text });
   }
 
   delay() {
@@ -173,7 +173,7 @@ export class Session extends EventTarget {
   }
 
   // Somebody looks again, or the network is back: no reason to wait.
-  hurry() {
+  retryNow() {
     if (document.visibilityState !== "visible" || this.closed || !this.info) return;
     if (this.ended) {
       this.create("The session had ended. A new one goes on with your parameters.");
@@ -224,11 +224,11 @@ export class Session extends EventTarget {
     if (!this.info) throw new Error("The simulation is not ready yet.");
     const { status, data } = await request(method, `/api/sessions/${this.info.id}/${what}`, body);
     if (status >= 200 && status < 300) return data;
-    if (status === 404) this.hurry();
+    if (status === 404) this.retryNow();
     throw new Error(data.error);
   }
 
-  tell(type, detail) {
+  emit(type, detail) {
     this.dispatchEvent(new CustomEvent(type, { detail }));
   }
 }

@@ -18,7 +18,7 @@ export class Curves {
 
   update(fields) {
     this.curves = this.plot.traces.flatMap((trace) => this.expand(trace, fields));
-    this.name();
+    this.updateLegend();
     this.draw();
   }
 
@@ -43,7 +43,7 @@ export class Curves {
   }
 
   // The legend has what is there; what has no points yet is faint in it.
-  name() {
+  updateLegend() {
     const labelled = this.curves.filter(({ label }) => label);
     const labels = labelled.map(({ label }) => label);
     if (labels.join("\n") !== [...this.entries.keys()].join("\n")) {
@@ -89,8 +89,8 @@ export class Curves {
     const x = around([...shown.flatMap(({ points }) => points.map(([a]) => a)), ...extra, ...(axis ? [0] : [])]);
     const y = around([...shown.flatMap(({ points }) => points.map(([, b]) => b)), ...extra]);
     // Beside a guide the frame stands still while points wander within it.
-    this.x = guide === "none" ? x : grown(this.x, x);
-    this.y = guide === "none" ? y : grown(this.y, y);
+    this.x = guide === "none" ? x : widened(this.x, x);
+    this.y = guide === "none" ? y : widened(this.y, y);
     const chart = this.chart;
     chart.begin(this.x, this.y, { square: equal || circle, xLabel, yLabel, logX, logY });
     const [x0, , y0, y1] = chart.ranges;
@@ -126,7 +126,7 @@ function tone(series) {
 }
 
 // The old range while it fits and is not much too wide, else the wanted one.
-function grown(old, wanted) {
+function widened(old, wanted) {
   const fits = old && old[0] <= wanted[0] && old[1] >= wanted[1];
   return fits && old[1] - old[0] < 3 * (wanted[1] - wanted[0]) ? old : wanted;
 }

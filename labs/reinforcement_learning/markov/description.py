@@ -1,4 +1,4 @@
-"""What the structure of a Markov reward process means, said in sentences."""
+"""What the structure of a Markov reward process means, in sentences."""
 
 import numpy as np
 
@@ -29,19 +29,19 @@ def structure(process: RewardProcess) -> list[str]:
     names, classes = process.table.states, process.classes
     closed = [c for c in classes if c.closed]
     if is_irreducible(classes):
-        said = ["Irreducible: every state leads to every other."]
+        text = ["Irreducible: every state leads to every other."]
     else:
-        said = ["Not irreducible: not every state leads to every other. " + _parts(names, classes)]
+        text = ["Not irreducible: not every state leads to every other. " + _parts(names, classes)]
     if len(closed) == 1:
-        said.append(_one_end(names, process.eigenvalues, closed[0]))
+        text.append(_one_end(names, process.eigenvalues, closed[0]))
     else:
-        said.append(
+        text.append(
             f"{_count(len(closed))} closed classes: P has the eigenvalue 1 {_times(len(closed))}, "
             "and every mixture of their distributions is stationary. Where the walk begins (and "
             "its luck) decides."
         )
-        said += [_round_trip(names, c) for c in closed if c.period > 1]
-    return said
+        text += [_round_trip(names, c) for c in closed if c.period > 1]
+    return text
 
 
 def value(process: RewardProcess, gamma: float) -> str:
@@ -57,7 +57,7 @@ def value(process: RewardProcess, gamma: float) -> str:
     closed = [c for c in process.classes if c.closed]
     singular = "γ = 1: I − P is singular, for P has the eigenvalue 1. "
     if found.finite.all():
-        ends = _names(names, np.concatenate([c.states for c in closed]))
+        ends = _join_names(names, np.concatenate([c.states for c in closed]))
         return (
             f"{singular}V exists all the same: the chain is sure to end in {ends}, for nothing. "
             "Put V = 0 there, and the system of the other states is regular."
@@ -76,27 +76,31 @@ def _unending(process: RewardProcess, finite: np.ndarray) -> str:
         process.long_run @ np.abs(process.C),
     )  # of a step, long run
     mean[np.abs(mean) <= CANCELLED * size] = 0.0
-    which = "every state" if len(never) == len(names) else _names(names, never)
+    which = "every state" if len(never) == len(names) else _join_names(names, never)
     stays = np.concatenate([c.states for c in process.classes if c.closed])
     if not mean[stays].any():
-        said = (
+        text = (
             f"From {which} costs come and go for ever. Their mean is 0, so that V = C + P V has "
             "infinitely many solutions, and the sum of costs need not settle."
         )
     else:
         rates = sorted(mean[never])
         grows = " to ".join(dict.fromkeys(_number(rate) for rate in (rates[0], rates[-1])))
-        said = (
+        text = (
             f"From {which} the chain never ends, and in the long run a step costs {grows} on "
             "average: the sum of costs has no finite value."
         )
     if len(may):
-        said += f" From {_names(names, may)} it may end or come to that: no finite value either."
+        text += (
+            f" From {_join_names(names, may)} it may end or come to that: no finite value either."
+        )
     if len(sure):
-        ends = _names(names, stays[finite[stays]])
-        said += f" From {_names(names, sure)} V exists: the chain is sure to end in {ends}, for "
-        said += "nothing."
-    return said
+        ends = _join_names(names, stays[finite[stays]])
+        text += (
+            f" From {_join_names(names, sure)} V exists: the chain is sure to end in {ends}, for "
+        )
+        text += "nothing."
+    return text
 
 
 def controls(process: RewardProcess, gamma: float) -> str:
@@ -111,11 +115,11 @@ def controls(process: RewardProcess, gamma: float) -> str:
     wins = np.flatnonzero(Q.min(axis=1) < found.V - tie)
     if not len(wins):
         return "No control is better than this policy: V = min Q in every state."
-    told = [
+    phrases = [
         f"{table.controls[best[x]]} in {table.states[x]} ({_less(Q[x, best[x]], found.V[x])})"
         for x in wins
     ]
-    return f"Once, and then the policy, is cheaper (Q < V): {', '.join(told)}."
+    return f"Once, and then the policy, is cheaper (Q < V): {', '.join(phrases)}."
 
 
 def edits(process: RewardProcess, source: int, target: int) -> str:
@@ -129,13 +133,13 @@ def edits(process: RewardProcess, source: int, target: int) -> str:
 
 
 def _parts(names: tuple[str, ...], classes: list[CommunicatingClass]) -> str:
-    closed = [_names(names, c.states) for c in classes if c.closed]
+    closed = [_join_names(names, c.states) for c in classes if c.closed]
     passed = np.concatenate([c.states for c in classes if not c.closed] or [np.zeros(0, int)])
-    said = f"Nothing leads out of {' or out of '.join(closed)}."
+    text = f"Nothing leads out of {' or out of '.join(closed)}."
     if len(passed):
         leaves = "is left" if len(passed) == 1 else "are left"
-        said += f" {_names(names, passed)} {leaves} for good sooner or later."
-    return said
+        text += f" {_join_names(names, passed)} {leaves} for good sooner or later."
+    return text
 
 
 def _one_end(names: tuple[str, ...], modes: np.ndarray, end: CommunicatingClass) -> str:
@@ -162,7 +166,7 @@ def _one_end(names: tuple[str, ...], modes: np.ndarray, end: CommunicatingClass)
 
 
 def _round_trip(names: tuple[str, ...], c: CommunicatingClass) -> str:
-    where = "" if len(c.states) == len(names) else f" within {_names(names, c.states)}"
+    where = "" if len(c.states) == len(names) else f" within {_join_names(names, c.states)}"
     return (
         f"Periodic: ways back{where} take multiples of {c.period} steps. {_count(c.period)} "
         "eigenvalues lie on the unit circle, and μ goes round for ever; only its mean over time "
@@ -170,9 +174,9 @@ def _round_trip(names: tuple[str, ...], c: CommunicatingClass) -> str:
     )
 
 
-def _names(names: tuple[str, ...], states: np.ndarray) -> str:
-    told = [names[x] for x in sorted(states)]
-    return told[0] if len(told) == 1 else f"{', '.join(told[:-1])} and {told[-1]}"
+def _join_names(names: tuple[str, ...], states: np.ndarray) -> str:
+    phrases = [names[x] for x in sorted(states)]
+    return phrases[0] if len(phrases) == 1 else f"{', '.join(phrases[:-1])} and {phrases[-1]}"
 
 
 def _number(value: float, digits: int = 3) -> str:

@@ -39,13 +39,13 @@ def run(
     if solution:
         solution = _with_changes(entry, solution, changes or {}, seed)
     world = World(entry, changes, seed or 0, steps + 1, solution)
-    told = any(event.name == "iterate" for event in todo if event.kind == "solve")
+    iterations_given = any(event.name == "iterate" for event in todo if event.kind == "solve")
     for step in range(steps + 1):
         while todo and todo[0].step <= step:
-            if todo[0].name == "show" and not told:
+            if todo[0].name == "show" and not iterations_given:
                 _solve(world)
             _apply(world, todo.pop(0))
-        if not told:
+        if not iterations_given:
             _solve(world)
         if step == steps or world.trouble:
             break

@@ -93,8 +93,8 @@ class Recording:
 
         channels = {name: np.ascontiguousarray(a) for name, a in self.channels.items()}
         loaded = {"solution": self.solution} if self.solution else {}
-        whole = {**self.about, **loaded, "channels": channels}
-        return orjson.dumps(whole, option=orjson.OPT_SERIALIZE_NUMPY)
+        document = {**self.about, **loaded, "channels": channels}
+        return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
 
     def csv(self) -> bytes:
         """One line of about as a `#` comment, a header, a line a sample."""

@@ -49,6 +49,6 @@ def nearest_reachable(params: DifferentialParams, target: np.ndarray, q: np.ndar
     postures."""
     model = params.arm.model
     lower, upper = model.lowerPositionLimit, model.upperPositionLimit
-    within = np.maximum(lower, -np.pi), np.minimum(upper, np.pi)
-    others = np.random.default_rng(0).uniform(*within, (STARTS, len(q)))
+    bounds = np.maximum(lower, -np.pi), np.minimum(upper, np.pi)
+    others = np.random.default_rng(0).uniform(*bounds, (STARTS, len(q)))
     return nearest_distance(params.kinematics, target, [q, *others], lower, upper)

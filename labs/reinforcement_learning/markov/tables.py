@@ -141,13 +141,15 @@ def _csv_rows(text: str) -> Iterator[_Row]:
         )
     if len(set(columns)) < len(columns) or "" in columns:
         raise LabError(f"each column has a name of its own; the heading is {', '.join(columns)}")
-    told = [name.lower() if name.lower() in ("control", "cost") else name for name in columns]
+    columns_lower = [
+        name.lower() if name.lower() in ("control", "cost") else name for name in columns
+    ]
     for number, line in enumerate(cells[1:], 1):
         if len(line) != len(columns):
             raise LabError(
                 f"{_name(number, line[0])}: {len(line)} entries for {len(columns)} columns"
             )
-        named = dict(zip(told[1:], line[1:], strict=True))
+        named = dict(zip(columns_lower[1:], line[1:], strict=True))
         control = named.pop("control", "")
         name = _name(number, line[0], control)
         if mark != ",":  # numbers may then have a decimal comma

@@ -37,6 +37,7 @@ class ViserScene:
         self._frame = 0
         self._camera: tuple[tuple[float, ...], tuple[float, ...]] | None = None
         server.gui.main_panel.dock_right()
+        server.gui.main_panel.minimize()  # one tap away: the page has knobs of its own
         self.set_view(view)
 
     def set_view(self, view: View) -> None:

@@ -2,10 +2,11 @@
 // tells what to look for, and where.
 
 export class Experiments {
-  constructor(lab, apply, watch) {
+  constructor(lab, apply, watch, highlight) {
     this.lab = lab;
     this.apply = apply; // (params) => Promise<boolean>: was it done
     this.watch = watch; // (part of a plot's title) => void
+    this.highlight = highlight; // (names of parameters) => void
     this.cards = [...document.querySelectorAll("[data-experiment]")];
     this.cards.forEach((card, i) => {
       card.querySelector(".try").addEventListener("click", () => this.start(i));
@@ -19,13 +20,15 @@ export class Experiments {
     if (!(await this.apply(set))) return;
     for (const other of this.cards) other.classList.toggle("current", other === card);
     card.querySelector("details").open = true;
-    card.scrollIntoView({ block: "nearest", behavior: "smooth" });
+    card.scrollIntoView({ block: "nearest" });
+    this.highlight(Object.keys(set));
     this.watch(watch);
   }
 
   // The settings have moved on: no card is the current one.
   leave() {
     for (const card of this.cards) card.classList.remove("current");
+    this.highlight([]);
     this.watch("");
   }
 }

@@ -1,8 +1,10 @@
-// The table "Symbols and sliders": shows every parameter's present value and takes another one.
+// The page's knobs: every parameter's present value, its track, and the way to another value.
 
 import { plain } from "./format.js";
+import { positionOf, stepped, valueAt } from "./scales.js";
 
 const PATIENCE = 700; // [ms] an own change may take to come back before the stream is believed again
+const KEYS = { ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1, PageUp: 10, PageDown: -10 };
 
 export class Knobs {
   constructor(lab, change) {
@@ -16,17 +18,31 @@ export class Knobs {
   }
 
   wire(tunable, row) {
-    const field = row.querySelector(".value :is(input, select, textarea)");
+    const field = document.getElementById(`value-${tunable.name}`);
+    const track = document.getElementById(`track-${tunable.name}`);
     const wrong = row.querySelector(".wrong");
     const undo = row.querySelector(".undo");
-    const entry = { tunable, row, field, wrong, undo, until: 0 };
+    const entry = { tunable, row, field, track, wrong, undo, until: 0 };
     field.addEventListener("change", () => this.commit(entry, read(entry)));
     undo.addEventListener("click", () => this.commit(entry, tunable.default));
     if (tunable.kind === "knob") field.addEventListener("focus", () => field.select());
-    if (typed(entry)) {
-      field.addEventListener("keydown", (event) => this.onKey(event, entry));
-    }
+    if (typed(entry)) field.addEventListener("keydown", (event) => this.onKey(event, entry));
+    if (track) this.wireTrack(entry);
     return entry;
+  }
+
+  wireTrack(entry) {
+    const { tunable, track } = entry;
+    track.style.setProperty("--default", positionOf(tunable, tunable.default));
+    track.addEventListener("input", () => this.drag(entry, valueAt(tunable, Number(track.value))));
+    track.addEventListener("dblclick", () => this.drag(entry, tunable.default));
+    track.addEventListener("keydown", (event) => {
+      const ends = { Home: tunable.low, End: tunable.high };
+      const steps = KEYS[event.key];
+      if (!steps && !(event.key in ends)) return;
+      event.preventDefault();
+      this.drag(entry, ends[event.key] ?? stepped(tunable, entry.wanted ?? this.values[tunable.name], steps));
+    });
   }
 
   onKey(event, entry) {
@@ -34,7 +50,7 @@ export class Knobs {
     if (event.key === "Enter" && (!lines || event.ctrlKey || event.metaKey)) entry.field.blur();
     if (event.key === "Escape") {
       write(entry, this.values[entry.tunable.name]);
-      entry.wrong.hidden = true;
+      mark(entry, "");
       entry.field.blur();
     }
     const step = { ArrowUp: 1, ArrowDown: -1 }[event.key];
@@ -45,20 +61,41 @@ export class Knobs {
     this.commit(entry, value);
   }
 
+  // While a thumb moves the latest value wins: one change is under way at a time.
+  async drag(entry, value) {
+    write(entry, value);
+    entry.until = performance.now() + PATIENCE;
+    const underWay = entry.wanted !== undefined;
+    entry.wanted = value;
+    if (underWay) return;
+    while (entry.wanted !== undefined) {
+      const next = entry.wanted;
+      await this.commit(entry, next);
+      if (entry.wanted === next) entry.wanted = undefined;
+    }
+  }
+
   async commit(entry, value) {
-    const { tunable, wrong } = entry;
-    wrong.hidden = true;
+    const { tunable } = entry;
+    mark(entry, "");
     if (value === this.values[tunable.name]) return write(entry, value);
     entry.until = performance.now() + PATIENCE;
     try {
       await this.change({ [tunable.name]: value });
     } catch (error) {
       entry.until = 0;
-      wrong.textContent = error.message;
-      wrong.hidden = false;
-      // A text that is wrong stays, to be put right; Escape brings the valid one back.
-      if (tunable.kind !== "text") write(entry, this.values[tunable.name]);
+      // What is wrong stays, to be put right; Escape brings the valid one back.
+      mark(entry, error.message);
     }
+  }
+
+  // Marks the knobs an experiment has set, and brings them into view.
+  highlight(names) {
+    for (const [name, { row }] of this.rows) row.classList.toggle("set", names.includes(name));
+    const set = names.map((name) => this.rows.get(name)?.row).filter(Boolean);
+    for (const row of set) row.closest("details")?.setAttribute("open", "");
+    set.at(-1)?.scrollIntoView({ block: "nearest" });
+    set[0]?.scrollIntoView({ block: "nearest" });
   }
 
   // The truth from the server.
@@ -69,13 +106,13 @@ export class Knobs {
       const known = this.values[name];
       const own = performance.now() < entry.until;
       const typing = document.activeElement === entry.field && typed(entry);
-      if (value === known && !own) continue;
-      if (own && value === known) continue;
+      if (value === known) continue;
       this.values[name] = value;
       entry.row.classList.toggle("changed", value !== entry.tunable.default);
       entry.undo.hidden = value === entry.tunable.default;
+      if (entry.wanted !== undefined) continue; // the hand is still on it
       if (!typing || own) write(entry, value);
-      entry.wrong.hidden = true;
+      mark(entry, "");
       if (known !== undefined && !own) flash(entry.row);
       entry.until = 0;
     }
@@ -93,27 +130,29 @@ function read({ tunable, field }) {
   return text !== "" && Number.isFinite(value) ? value : text;
 }
 
-function write({ tunable, field }, value) {
+function write({ tunable, field, track }, value) {
   if (value === undefined) return;
   if (tunable.kind === "toggle") field.checked = value;
   else if (tunable.kind === "choice") field.value = tunable.options.findIndex((option) => option.value === value);
   else if (tunable.kind === "text") field.value = value;
   else field.value = plain(value);
+  if (!track) return;
+  const position = positionOf(tunable, value);
+  track.value = position;
+  track.style.setProperty("--at", position);
+  track.setAttribute("aria-valuetext", `${plain(value)} ${tunable.unit}`.trim());
+}
+
+// Says what is wrong with a value, or with "" that nothing is.
+function mark({ field, wrong }, message) {
+  wrong.textContent = message;
+  wrong.hidden = !message;
+  field.setAttribute("aria-invalid", String(Boolean(message)));
 }
 
 // Whether it is a field one types into.
 function typed({ tunable }) {
   return tunable.kind === "knob" || tunable.kind === "text";
-}
-
-// The value a little further along the slider.
-function stepped({ low, high, step, scale }, value, direction) {
-  if (scale === "log" && value > 0) {
-    const factor = Number((value * 1.1 ** direction).toPrecision(3));
-    return Math.min(high, Math.max(low, factor));
-  }
-  const grain = step || (high - low) / 100;
-  return Math.min(high, Math.max(low, Number((value + direction * grain).toPrecision(6))));
 }
 
 function flash(row) {

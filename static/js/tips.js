@@ -36,6 +36,7 @@ export function wireTips(lab, valueOf) {
 // Brings a parameter's row into view, ready to type.
 function reveal(name) {
   const field = document.getElementById(`value-${name}`);
-  field?.closest("tr").scrollIntoView({ block: "center", behavior: "smooth" });
+  field?.closest("details")?.setAttribute("open", "");
+  field?.closest(".knob").scrollIntoView({ block: "nearest", behavior: "smooth" });
   field?.focus({ preventScroll: true });
 }

@@ -10,6 +10,7 @@ import { Matrix } from "./matrix.js";
 import { Note } from "./note.js";
 import { forgetColours } from "./palette.js";
 import { Readouts } from "./readouts.js";
+import { Shelf } from "./shelf.js";
 import { TimeSeries } from "./timeseries.js";
 
 const KINDS = { TimeSeries, Curves, Bars, Matrix, HeatMap, Note };
@@ -25,6 +26,7 @@ export class Board {
     this.readouts = new Readouts(lab.plots.filter((p) => p.kind === "Readout"), document.getElementById("tiles"));
     this.plots = lab.plots.filter((p) => p.kind in KINDS).map((p) => new KINDS[p.kind](p, this));
     document.getElementById("plots").append(...this.plots.map((plot) => plot.section));
+    this.shelf = new Shelf(this.plots, document.getElementById("tabs"), () => this.refresh());
     this.series = this.plots.filter((plot) => plot instanceof TimeSeries);
     this.pictured = this.plots.filter((plot) => plot.update);
     this.unzoomButton = document.getElementById("unzoom");
@@ -110,13 +112,13 @@ export class Board {
     for (const plot of this.plots) plot.rebuild?.();
   }
 
-  // Shows a reader where to look.
+  // Shows a reader where to look: the plot of this title, or those whose titles contain the text.
   watch(text) {
-    for (const plot of this.plots) {
-      const wanted = text !== "" && plot.plot.title.toLowerCase().includes(text.toLowerCase());
-      plot.section.classList.toggle("watched", wanted);
-      if (wanted) plot.section.scrollIntoView({ block: "nearest", inline: "start", behavior: "smooth" });
-    }
+    const matches = (title) => title.toLowerCase().includes(text.toLowerCase());
+    const exact = this.plots.filter((plot) => plot.plot.title === text);
+    const wanted = text === "" ? [] : exact.length ? exact : this.plots.filter((plot) => matches(plot.plot.title));
+    for (const plot of this.plots) plot.section.classList.toggle("watched", wanted.includes(plot));
+    this.shelf.watch(wanted);
   }
 
   // The component chosen for plots whose components share this name: an index, or "all".

@@ -41,7 +41,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         folder, _, _ = paths[item].partition("/")
         callspec = getattr(item, "callspec", None)
         entry = callspec.params.get("entry") if callspec else None
-        group = entry.slug if entry else paths[item] if folder == "labs" else folder
+        group = (entry.slug if entry else paths[item]) if folder == "labs" else folder
         item.add_marker(pytest.mark.xdist_group(group))
 
 

@@ -238,11 +238,14 @@ def test_curves_are_named_and_can_be_hidden(page: Page) -> None:
     expect(chart.locator("polyline")).to_have_count(1)
 
 
-def test_what_has_no_curve_is_faint_in_the_legend(page: Page) -> None:
-    LabPage(page, scene=False).open("lqr-tracking", "?robot=cart-pole")
+def test_a_legend_names_what_is_there_and_what_has_no_curve_is_faint(page: Page) -> None:
+    lab = LabPage(page, scene=False).open("lqr-tracking", "?robot=cart-pole")
     legend = page.get_by_role("region", name="Affine term over the preview").locator(".legend")
-    expect(legend.locator("button")).to_have_count(6)
-    expect(legend.locator("button.nothing")).to_have_count(5)
+    expect(legend.locator("button")).to_have_text(["k, motor 1"])
+    lab.open("dynamic-programming", "?map=S.%23G&gamma=1")
+    legend = page.get_by_role("region", name="Cost-to-go of the start").locator(".legend")
+    expect(legend.locator("button")).to_have_count(3)
+    expect(legend.locator("button.nothing")).to_have_text(["infinite horizon"])
 
 
 def test_a_text_is_edited_and_a_wrong_one_stays_to_be_put_right(page: Page) -> None:

@@ -6,7 +6,7 @@ An experiment is a fenced block with the info string `experiment` that holds TOM
     question = "Where will the arm come to rest?"    # Markdown; asks for a prediction first
     observe = "The error stays at $e = g / k_p$."    # Markdown; shown once the button is pressed
     button = "Try it"
-    watch = "error"                                  # optional: part of a plot's title
+    watch = "Error"                                  # optional: a plot's title
     [set]
     controller = "pd"                                # all other parameters take their defaults
 """
@@ -160,8 +160,8 @@ class _Writer:
         self._check(name, settings, data.get("watch", ""))
         return Experiment(
             data["title"],
-            self.markdown.render(data["question"]),
-            self.markdown.render(data["observe"]),
+            self.markdown.render(_escape_number(data["question"])),
+            self.markdown.render(_escape_number(data["observe"])),
             data["button"],
             data.get("watch", ""),
             settings,
@@ -173,8 +173,8 @@ class _Writer:
         except LabError as error:
             raise ArticleError(f"{name}: {error}") from None
         titles = [plot.title for plot in self.lab.plots if hasattr(plot, "title")]
-        if watch and not any(watch.lower() in title.lower() for title in titles):
-            raise ArticleError(f"{name}: no plot's title has {watch!r}; there are {titles}")
+        if watch and watch not in titles:
+            raise ArticleError(f"{name}: no plot has the title {watch!r}; there are {titles}")
 
 
 class _Symbols:
@@ -198,6 +198,11 @@ class _Symbols:
             marked = f'<mrow class="symbol" data-param="{name}">{part}</mrow>'
             formula = formula.replace(part, marked)
         return formula
+
+
+def _escape_number(text: str) -> str:
+    """A text whose first words are "22. The" begins with a number, not with a list."""
+    return re.sub(r"\A(\d+)\. ", r"\1\\. ", text)
 
 
 def _inner(formula: str) -> str:

@@ -5,7 +5,7 @@ export class Experiments {
   constructor(lab, apply, watch, highlight) {
     this.lab = lab;
     this.apply = apply; // (params) => Promise<boolean>: was it done
-    this.watch = watch; // (part of a plot's title) => void
+    this.watch = watch; // (title of a plot) => void
     this.highlight = highlight; // (names of parameters) => void
     this.cards = [...document.querySelectorAll("[data-experiment]")];
     this.cards.forEach((card, i) => {
@@ -21,6 +21,7 @@ export class Experiments {
     for (const other of this.cards) other.classList.toggle("current", other === card);
     card.querySelector("details").open = true;
     card.scrollIntoView({ block: "nearest" });
+    card.querySelector("details").scrollIntoView({ block: "nearest" }); // where the card is taller
     this.highlight(Object.keys(set));
     this.watch(watch);
   }

@@ -22,7 +22,7 @@ const board = new Board(lab);
 const transport = new Transport(send);
 const solver = new SolverRow(send, loadSolution);
 const knobs = new Knobs(lab, (changes) => session.change(changes));
-const experiments = new Experiments(lab, apply, (text) => board.watch(text), (names) => knobs.highlight(names));
+const experiments = new Experiments(lab, apply, (title) => board.watch(title), (names) => knobs.highlight(names));
 let link = location.href;
 let fresh = null; // parameters an experiment or preset has just set
 

@@ -16,6 +16,21 @@ FRAMES = """count => new Promise(done => {
   next();
 })"""
 
+WHOLE = """selector => {
+  const found = [...document.querySelectorAll(selector)];
+  return found.length > 0 && found.every(element => {
+    let box = element.getBoundingClientRect();
+    if (!box.width || !box.height) return false;
+    if (box.top < -1 || box.left < -1 || box.right > innerWidth + 1 || box.bottom > innerHeight + 1) return false;
+    for (let host = element.parentElement; host; host = host.parentElement) {
+      if (getComputedStyle(host).overflowY === "visible") continue;
+      const frame = host.getBoundingClientRect();
+      if (box.top < frame.top - 1 || box.bottom > frame.bottom + 1) return false;
+    }
+    return true;
+  });
+}"""
+
 Message = dict[str, Any]
 
 
@@ -58,9 +73,27 @@ class LabPage:
         self.page.unroute(SCENES)
         frame.goto(frame.url)
 
+    def pin(self, title: str) -> Locator:
+        """A plot, pinned in view if it is not yet."""
+        tab = self.page.locator("#tabs").get_by_role("button", name=title, exact=True)
+        if tab.get_attribute("aria-pressed") == "false":
+            tab.click()
+        plot = self.page.get_by_role("region", name=title, exact=True)
+        expect(plot).to_be_visible()
+        return plot
+
+    def whole(self, selector: str) -> bool:
+        """Whether all that a selector finds is in view, without scrolling, and there is some."""
+        found: bool = self.page.evaluate(WHOLE, selector)
+        return found
+
     def row(self, label: str) -> Locator:
-        """The row of the panel with this label: Viser associates no label with its slider."""
+        """The row of the scene's panel with this label, once the panel is unfolded: Viser associates
+        no label with its slider."""
         text = self.scene.get_by_text(label, exact=True)
+        expect(self.scene.locator("canvas").first).to_be_visible()
+        if not text.is_visible():
+            self.unfold_panel()
         expect(text).to_be_visible()
         return text.locator("xpath=ancestor::*[.//input or .//*[@role='slider']][1]")
 
@@ -68,7 +101,7 @@ class LabPage:
         return float(self.page.locator("#clock span").inner_text())
 
     def value(self, name: str) -> Locator:
-        """The value of a parameter in the article's table."""
+        """The value of a parameter in the column of knobs."""
         return self.page.locator(f"#value-{name}")
 
     def status(self) -> Message:

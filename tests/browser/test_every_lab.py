@@ -22,6 +22,9 @@ def test_every_experiment_and_a_slider_set_what_they_say(page: Page, entry: Entr
         expect(page.locator(".experiment").nth(number)).to_have_class(re.compile("current"))
         wanted = entry.lab.Params().change(experiment.settings).model_dump()
         assert lab.status()["params"] == wanted, experiment.title
+        if experiment.watch:
+            assert lab.whole(".plot.watched"), experiment.title
+        assert lab.whole(".experiment.current .observe"), experiment.title
         expect(page.locator("#banner")).not_to_contain_text("defect of the lab")
     page.keyboard.press("d")
     lab.told(when=lambda s: s["params"] == entry.lab.Params().model_dump())

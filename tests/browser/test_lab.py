@@ -6,6 +6,7 @@ from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
+import pytest
 from playwright.sync_api import BrowserContext, Page, expect
 
 from tests.browser.conftest import Visit, screenshot
@@ -59,16 +60,19 @@ def test_a_number_in_the_panel_changes_everything(page: Page) -> None:
     assert lab.status()["params"]["kp"] == 750
 
 
-def test_dragging_a_slider_changes_the_motion(page: Page) -> None:
+def test_dragging_a_knob_changes_the_motion(page: Page) -> None:
     lab = LabPage(page).open("joint-control", "?controller=pid&kp=1000&reference=set-point")
-    handle = lab.row("N·m/rad").get_by_role("slider")
-    handle.scroll_into_view_if_needed()
-    thumb = handle.bounding_box()
-    assert thumb
-    page.mouse.move(thumb["x"] + thumb["width"] / 2, thumb["y"] + thumb["height"] / 2)
+    track = page.locator("#track-kp")
+    track.scroll_into_view_if_needed()
+    box = track.bounding_box()
+    assert box
+    assert box["width"] >= 150
+    y = box["y"] + box["height"] / 2
+    # A logarithmic track through zero: 1000 of 2000 stands at log(1 + 0.5 * 999) / log(1000).
+    page.mouse.move(box["x"] + 7 + 0.9 * (box["width"] - 14), y)
     page.mouse.down()
     for k in range(1, 9):
-        page.mouse.move(thumb["x"] - 8 * k, thumb["y"] + thumb["height"] / 2)
+        page.mouse.move(box["x"] + 7 + (0.9 - 0.02 * k) * (box["width"] - 14), y)
         wait_frames(page)
     page.mouse.up()
     page.wait_for_function("document.getElementById('value-kp').value < 400")
@@ -83,12 +87,36 @@ def test_dragging_a_slider_changes_the_motion(page: Page) -> None:
     assert float(found[1]) > 0.05
 
 
-def test_the_table_sets_values_and_refuses_wrong_ones(page: Page) -> None:
+@pytest.mark.parametrize(
+    ("typed", "value"), [("2.5", 2.5), ("1e-3", 0.001), ("0,5", 0.5), ("-0", 0.0), ("1999.5", 1999.5)]
+)
+def test_a_number_is_taken_as_a_person_types_it(page: Page, typed: str, value: float) -> None:
+    lab = LabPage(page, scene=False).open("joint-control")
+    lab.value("kp").click()
+    page.keyboard.type(typed)
+    expect(lab.value("kp")).to_have_value(typed)
+    page.keyboard.press("Enter")
+    lab.told(when=lambda s: s["params"]["kp"] == value)
+
+
+def test_a_track_goes_by_keyboard(page: Page) -> None:
+    lab = LabPage(page, scene=False).open("joint-control")
+    track = page.locator("#track-amplitude")
+    for key, value in (("End", 0.8), ("Home", 0.0), ("ArrowUp", 0.01), ("PageUp", 0.11)):
+        track.press(key)
+        lab.told(when=lambda s, value=value: s["params"]["amplitude"] == value)  # type: ignore[misc]
+    expect(track).to_have_attribute("aria-valuetext", "0.11 rad")
+    track.dblclick()
+    lab.told(when=lambda s: s["params"]["amplitude"] == 0.3)
+
+
+def test_the_knobs_set_values_and_keep_wrong_ones(page: Page) -> None:
     lab = LabPage(page).open("joint-control")
     lab.value("kp").fill("99999")
     lab.value("kp").press("Enter")
     wrong = page.locator("#param-kp .wrong")
     expect(wrong).to_contain_text("kp takes a number from 0 to 2000")
+    expect(lab.value("kp")).to_have_value("99999")
     assert lab.status()["params"]["kp"] == 200
     lab.value("kp").fill("300")
     lab.value("kp").press("Enter")
@@ -216,21 +244,19 @@ def test_divergence_is_explained_and_reset_recovers(page: Page) -> None:
 
 
 def test_every_kind_of_plot_draws(page: Page) -> None:
-    LabPage(page, scene=False).open("oscillator")
-    for title in ("Position", "Phase", "Waves", "Field", "Matrix", "Bars", "Note"):
-        expect(page.get_by_role("region", name=title)).to_be_visible()
-    page.get_by_role("region", name="Field").scroll_into_view_if_needed()
-    expect(page.locator("#plots .js-plotly-plot")).to_be_visible(timeout=20_000)
-    expect(page.locator("#plots table")).to_contain_text(re.compile(r"-?\d\.\d"))
-    expect(page.get_by_role("region", name="Bars").locator(".mark")).to_have_count(2)
-    note = page.get_by_role("region", name="Note").locator("p")
+    lab = LabPage(page, scene=False).open("oscillator")
+    for title in ("Position", "Phase", "Waves"):
+        lab.pin(title)
+    expect(lab.pin("Field").locator(".js-plotly-plot")).to_be_visible(timeout=20_000)
+    expect(lab.pin("Matrix").locator("table")).to_contain_text(re.compile(r"-?\d\.\d"))
+    expect(lab.pin("Bars").locator(".mark")).to_have_count(2)
+    note = lab.pin("Note").locator("p")
     expect(note).to_have_text([re.compile(r"on the (left|right)\.$"), "It swings."])
     screenshot(page, "plots")
 
 
 def test_curves_are_named_and_can_be_hidden(page: Page) -> None:
-    LabPage(page, scene=False).open("oscillator")
-    chart = page.get_by_role("region", name="Waves")
+    chart = LabPage(page, scene=False).open("oscillator").pin("Waves")
     entry = chart.get_by_role("button", name="square")
     expect(chart.locator("polyline")).to_have_count(2)
     entry.click()
@@ -240,10 +266,10 @@ def test_curves_are_named_and_can_be_hidden(page: Page) -> None:
 
 def test_a_legend_names_what_is_there_and_what_has_no_curve_is_faint(page: Page) -> None:
     lab = LabPage(page, scene=False).open("lqr-tracking", "?robot=cart-pole")
-    legend = page.get_by_role("region", name="Affine term over the preview").locator(".legend")
+    legend = lab.pin("Affine term over the preview").locator(".legend")
     expect(legend.locator("button")).to_have_text(["k, motor 1"])
     lab.open("dynamic-programming", "?map=S.%23G&gamma=1")
-    legend = page.get_by_role("region", name="Cost-to-go of the start").locator(".legend")
+    legend = lab.pin("Cost-to-go of the start by the time to go").locator(".legend")
     expect(legend.locator("button")).to_have_count(3)
     expect(legend.locator("button.nothing")).to_have_text(["infinite horizon"])
 
@@ -268,7 +294,7 @@ def test_a_text_is_edited_and_a_wrong_one_stays_to_be_put_right(page: Page) -> N
 
 def test_a_shaded_matrix_shows_size_and_sign(page: Page) -> None:
     """Its entries are [x, 1; 1, -x]: one tone for both ones, two for x and -x."""
-    LabPage(page, scene=False).open("oscillator")
+    LabPage(page, scene=False).open("oscillator").pin("Matrix")
     expect(page.locator("#plots table")).to_contain_text(re.compile(r"\d"))
     page.wait_for_function(
         """() => {

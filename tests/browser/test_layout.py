@@ -33,6 +33,21 @@ def test_nothing_overflows(page: Page, path: str) -> None:
         assert (lightness(page) < 200) if scheme == "dark" else (lightness(page) > 600)
 
 
+@pytest.mark.parametrize(("width", "height"), [(1366, 650), (1440, 790)])
+def test_knobs_robot_and_plots_are_in_view_together(page: Page, width: int, height: int) -> None:
+    page.set_viewport_size({"width": width, "height": height})
+    for slug in ("joint-control", "lqr"):
+        lab = LabPage(page, scene=False).open(slug)
+        for part in ("#view", "#transport", "#tiles", "#plots > :not([hidden])", "#shelf"):
+            assert lab.whole(part), (slug, part)
+        scene = page.locator("#view").bounding_box()
+        assert scene
+        assert scene["width"] >= 0.45 * width
+        gains = ("kp", "ki", "kd") if slug == "joint-control" else ("q_slide", "q_turn", "r")
+        assert all(lab.whole(f"#param-{name}") for name in gains)
+        screenshot(page, f"{slug}-{width}")
+
+
 def lightness(page: Page) -> int:
     """Of the page's background: red + green + blue."""
     color = page.evaluate("getComputedStyle(document.documentElement).backgroundColor")
@@ -86,7 +101,7 @@ def test_no_address_outside_is_asked(visit: Visit, served: Served) -> None:
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
     lab = LabPage(page).open("oscillator")
-    page.get_by_role("region", name="Field").scroll_into_view_if_needed()
+    lab.pin("Field")
     expect(page.locator("#plots .js-plotly-plot")).to_be_visible()
     expect(lab.scene.locator("canvas").first).to_be_visible()
     page.wait_for_load_state("networkidle")

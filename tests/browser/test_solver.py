@@ -84,14 +84,14 @@ def test_dragging_back_shows_what_was_and_its_end_the_latest(page: Page) -> None
 def test_a_solution_is_taken_home_and_brought_back(page: Page, tmp_path: Path, form: str) -> None:
     lab = LabPage(page, scene=False).open("descent", "?rate=0.03&many=40")
     expect(page.locator("#iterations")).to_have_text("40")
-    page.get_by_role("button", name="Solution").click()
+    page.get_by_role("button", name="Export").click()
     with page.expect_download() as download:
         page.locator(f"[data-solution={form}]").click()
     path = tmp_path / download.value.suggested_filename
     download.value.save_as(path)
     lab.open("descent")
     expect(page.locator("#iterations")).to_have_text("200")
-    page.get_by_role("button", name="Solution").click()
+    page.get_by_role("button", name="Export").click()
     with page.expect_file_chooser() as chooser:
         page.get_by_role("button", name="Load solution").click()
     chooser.value.set_files(path)

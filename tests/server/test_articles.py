@@ -85,9 +85,9 @@ def test_a_symbol_with_a_slider_names_it(entry: Entry) -> None:
 
 
 def test_an_experiment_is_read_and_shown(entry: Entry) -> None:
-    article = write(entry, experiment('watch = "error"\n[set]\nkp = 200.0\n'))
+    article = write(entry, experiment('watch = "Error"\n[set]\nkp = 200.0\n'))
     (found,) = article.experiments
-    assert (found.title, found.button, found.watch) == ("Sag", "Try <it>", "error")
+    assert (found.title, found.button, found.watch) == ("Sag", "Try <it>", "Error")
     assert dict(found.settings) == {"kp": 200.0}
     assert "<math>" in found.question
     assert "<strong>stays</strong>" in found.observe
@@ -106,7 +106,7 @@ def test_titles_are_escaped(entry: Entry) -> None:
         ("[set]\nkp = -1.0", "kp takes a number from"),
         ("[set]\nkp = true", "kp takes a number from"),
         ('[set]\ncontroller = "magic"', "controller takes one of"),
-        ('watch = "no such plot"', "no plot's title has 'no such plot'"),
+        ('watch = "no such plot"', "no plot has the title 'no such plot'"),
         ("wach = 1", "does not know wach"),
         ("watch = 1", "watch has the wrong type"),
         ("set = 1", "set has the wrong type"),
@@ -126,6 +126,13 @@ def test_an_experiment_needs_its_texts(entry: Entry, key: str) -> None:
     text = "\n".join(line for line in experiment().split("\n") if not line.startswith(key))
     with pytest.raises(ArticleError, match=f"lacks {key}"):
         write(entry, text)
+
+
+def test_an_answer_may_begin_with_a_number() -> None:
+    entry = find("joint-control")
+    text = experiment("").replace("It **stays**.", "22. That is all.")
+    (found,) = write(entry, text).experiments
+    assert "<p>22. That is all.</p>" in found.observe
 
 
 def test_tex_renders_symbols() -> None:

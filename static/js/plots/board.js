@@ -112,11 +112,9 @@ export class Board {
     for (const plot of this.plots) plot.rebuild?.();
   }
 
-  // Shows a reader where to look: the plot of this title, or those whose titles contain the text.
-  watch(text) {
-    const matches = (title) => title.toLowerCase().includes(text.toLowerCase());
-    const exact = this.plots.filter((plot) => plot.plot.title === text);
-    const wanted = text === "" ? [] : exact.length ? exact : this.plots.filter((plot) => matches(plot.plot.title));
+  // Shows a reader where to look: the plot of this title; none for "".
+  watch(title) {
+    const wanted = this.plots.filter((plot) => plot.plot.title === title);
     for (const plot of this.plots) plot.section.classList.toggle("watched", wanted.includes(plot));
     this.shelf.watch(wanted);
   }

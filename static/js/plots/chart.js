@@ -16,9 +16,14 @@ export class Chart {
   begin([x0, x1], [y0, y1], { square = false, xTicks = null, xLabel = "", yLabel = "", logX = false, logY = false } = {}) {
     const { clientWidth: width, clientHeight: height } = this.body;
     const em = 0.75 * parseFloat(getComputedStyle(document.documentElement).fontSize);
-    const left = 4.2 * em + (yLabel ? 1.6 * em : 0);
     const bottom = 2 * em + (xLabel ? 1.4 * em : 0);
-    this.area = { left, top: 0.7 * em, width: Math.max(1, width - left - em), height: Math.max(1, height - bottom - 0.7 * em) };
+    const tall = Math.max(1, height - bottom - 0.7 * em);
+    const yTicks = (from, to) => (logY ? decades : ticks)(from, to, tall / (3 * em));
+    const yText = logY ? power : label;
+    // As wide as the longest number, so that none is cut off: digits are 0.56 em wide or less.
+    const digits = Math.max(...yTicks(y0, y1).map((v) => yText(v).length), 3);
+    const left = (0.9 + 0.56 * Math.min(digits, 12)) * em + (yLabel ? 1.6 * em : 0);
+    this.area = { left, top: 0.7 * em, width: Math.max(1, width - left - em), height: tall };
     if (square) {
       const perPixel = Math.max((x1 - x0) / this.area.width, (y1 - y0) / this.area.height);
       [x0, x1] = about((x0 + x1) / 2, perPixel * this.area.width);
@@ -28,9 +33,9 @@ export class Chart {
     this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     this.svg.replaceChildren();
     const { top } = this.area;
-    for (const v of (logY ? decades : ticks)(y0, y1, this.area.height / (3 * em))) {
+    for (const v of yTicks(y0, y1)) {
       this.line([x0, v], [x1, v], v === 0 && !logY ? "zero" : "grid");
-      this.text(left - 0.5 * em, this.y(v) + 0.35 * em, (logY ? power : label)(v), "end");
+      this.text(left - 0.5 * em, this.y(v) + 0.35 * em, yText(v), "end");
     }
     for (const v of xTicks ?? (logX ? decades : ticks)(x0, x1, this.area.width / (6 * em))) {
       if (!xTicks) this.line([v, y0], [v, y1], v === 0 && !logX ? "zero" : "grid");
@@ -71,7 +76,10 @@ export function around(values, { zero = false } = {}) {
   const finite = values.filter(Number.isFinite);
   let low = Math.min(...finite, ...(zero || !finite.length ? [0] : []));
   let high = Math.max(...finite, ...(zero || !finite.length ? [0] : []));
-  if (high - low < 1e-9 * Math.max(1, Math.abs(high))) [low, high] = [low - 1, high + 1];
+  // A constant does not fill the frame with its rounding.
+  const size = Math.max(Math.abs(low), Math.abs(high));
+  if (high - low < 1e-6 * size) [low, high] = [low - 0.5 * size, high + 0.5 * size];
+  if (!(high > low)) [low, high] = [low - 1, high + 1];
   const margin = 0.08 * (high - low);
   return [low - margin, high + margin];
 }

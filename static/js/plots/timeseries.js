@@ -77,7 +77,7 @@ export class TimeSeries {
       },
       axes: [
         { ...axis, size: 1.75 * rem(), gap: 4, space: 4 * rem(), values: (u, ticks) => ticks.map((t) => `${+t.toFixed(6)} s`) },
-        { ...axis, size: 3.5 * rem(), gap: 6, space: 1.9 * rem(), values: (u, ticks) => ticks.map((v) => tick(v)) },
+        { ...axis, size: (u, texts) => (1 + 0.45 * Math.max(3, ...(texts ?? []).map((text) => text.length))) * rem(), gap: 6, space: 1.9 * rem(), values: (u, ticks) => ticks.map((v) => tick(v)) },
       ],
       series: [{}, ...this.curves.map((curve) => this.series(curve))],
       hooks: {

@@ -9,8 +9,10 @@ import os
 os.environ["ORCLAB_LABS"] = "tests.sample_labs"
 
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
+from xdist.scheduler import LoadScopeScheduling
 
 import labs  # noqa: F401  (before NumPy: it says how many threads BLAS gets)
 from tests.served import Served, until
@@ -30,19 +32,25 @@ def pytest_xdist_setupnodes() -> None:
     import labs.compiled  # noqa: F401
 
 
-@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Into an order, and into groups that stay in one lane: all tests of the browser, of the
-    server, of one lab's contract, and else of one file."""
+    """Into an order."""
     here = config.rootpath / "tests"
     paths = {item: item.path.relative_to(here).as_posix() for item in items}
     items.sort(key=lambda item: next(i for i, x in enumerate(ORDER) if paths[item].startswith(x)))
-    for item in items:
-        folder, _, _ = paths[item].partition("/")
-        callspec = getattr(item, "callspec", None)
-        entry = callspec.params.get("entry") if callspec else None
-        group = (entry.slug if entry else paths[item]) if folder == "labs" else folder
-        item.add_marker(pytest.mark.xdist_group(group))
+
+
+class Lanes(LoadScopeScheduling):  # type: ignore[misc]
+    """What stays together in one lane: all tests of the browser, of the server, else of a file."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        path = nodeid.partition("::")[0].removeprefix("tests/")
+        folder = path.partition("/")[0]
+        return path if folder == "labs" else folder
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Lanes:
+    """In place of xdist's groups, which this pytest's ids have no place for."""
+    return Lanes(config, log)
 
 
 @pytest.fixture(scope="session")

@@ -128,9 +128,8 @@ def test_an_experiment_needs_its_texts(entry: Entry, key: str) -> None:
         write(entry, text)
 
 
-def test_an_answer_may_begin_with_a_number() -> None:
-    entry = find("joint-control")
-    text = experiment("").replace("It **stays**.", "22. That is all.")
+def test_an_answer_may_begin_with_a_number(entry: Entry) -> None:
+    text = experiment().replace("It **stays**.", "22. That is all.")
     (found,) = write(entry, text).experiments
     assert "<p>22. That is all.</p>" in found.observe
 

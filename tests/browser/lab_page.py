@@ -19,9 +19,10 @@ FRAMES = """count => new Promise(done => {
 WHOLE = """selector => {
   const found = [...document.querySelectorAll(selector)];
   return found.length > 0 && found.every(element => {
-    let box = element.getBoundingClientRect();
+    const box = element.getBoundingClientRect();
     if (!box.width || !box.height) return false;
-    if (box.top < -1 || box.left < -1 || box.right > innerWidth + 1 || box.bottom > innerHeight + 1) return false;
+    if (box.top < -1 || box.bottom > innerHeight + 1) return false;
+    if (box.left < -1 || box.right > innerWidth + 1) return false;
     for (let host = element.parentElement; host; host = host.parentElement) {
       if (getComputedStyle(host).overflowY === "visible") continue;
       const frame = host.getBoundingClientRect();
@@ -87,9 +88,14 @@ class LabPage:
         found: bool = self.page.evaluate(WHOLE, selector)
         return found
 
+    def unfold_panel(self) -> None:
+        """Opens the scene's own panel, which waits as a strip at its side."""
+        title = self.page.locator("h1").inner_text()
+        self.scene.get_by_text(title, exact=True).first.click()
+
     def row(self, label: str) -> Locator:
-        """The row of the scene's panel with this label, once the panel is unfolded: Viser associates
-        no label with its slider."""
+        """The row of the scene's panel with this label, the panel unfolded: Viser associates no
+        label with its slider."""
         text = self.scene.get_by_text(label, exact=True)
         expect(self.scene.locator("canvas").first).to_be_visible()
         if not text.is_visible():

@@ -88,7 +88,8 @@ def test_dragging_a_knob_changes_the_motion(page: Page) -> None:
 
 
 @pytest.mark.parametrize(
-    ("typed", "value"), [("2.5", 2.5), ("1e-3", 0.001), ("0,5", 0.5), ("-0", 0.0), ("1999.5", 1999.5)]
+    ("typed", "value"),
+    [("2.5", 2.5), ("1e-3", 0.001), ("0,5", 0.5), ("-0", 0.0), ("1999.5", 1999.5)],
 )
 def test_a_number_is_taken_as_a_person_types_it(page: Page, typed: str, value: float) -> None:
     lab = LabPage(page, scene=False).open("joint-control")

@@ -16,6 +16,7 @@ SHIPPED = [entry for entry in catalog().values() if entry.package.startswith("la
 @pytest.mark.parametrize("entry", SHIPPED, ids=lambda entry: entry.slug)
 def test_every_experiment_and_a_slider_set_what_they_say(page: Page, entry: Entry) -> None:
     # Pressing is the page's own; drawing every scene in software would take minutes.
+    page.set_viewport_size({"width": 1366, "height": 650})  # a laptop's screen, less its bars
     lab = LabPage(page, scene=False).open(entry.slug)
     for number, experiment in enumerate(render(entry).experiments):
         page.locator(".experiment .try").nth(number).click()
@@ -24,7 +25,8 @@ def test_every_experiment_and_a_slider_set_what_they_say(page: Page, entry: Entr
         assert lab.status()["params"] == wanted, experiment.title
         if experiment.watch:
             assert lab.whole(".plot.watched"), experiment.title
-        assert lab.whole(".experiment.current .observe"), experiment.title
+        for part in (".experiment.current .observe", "#view", "#transport"):
+            assert lab.whole(part), (experiment.title, part)
         expect(page.locator("#banner")).not_to_contain_text("defect of the lab")
     page.keyboard.press("d")
     lab.told(when=lambda s: s["params"] == entry.lab.Params().model_dump())

@@ -14,8 +14,8 @@ from labs.engine.catalog import find
 from tests import chromium
 from tests.served import Served
 
-CARD, PANEL = (640, 400), 262
-"""[px] size of a card's picture; width of the panel beside the scene."""
+CARD, PANEL = (640, 400), 40
+"""[px] size of a card's picture; width of the strip beside the scene."""
 
 
 def main() -> None:

@@ -24,7 +24,6 @@ const solver = new SolverRow(send, loadSolution);
 const knobs = new Knobs(lab, (changes) => session.change(changes));
 const experiments = new Experiments(lab, apply, (title) => board.watch(title), (names) => knobs.highlight(names));
 let link = location.href;
-let fresh = null; // parameters an experiment or preset has just set
 
 // A command whose refusal is said at the bottom of the page. Tells whether it was done.
 async function send(command) {
@@ -38,7 +37,6 @@ async function send(command) {
 }
 
 function apply(params) {
-  fresh = performance.now();
   return send({ command: "apply", params, restart: true });
 }
 
@@ -98,7 +96,6 @@ function saveSolution(form) {
 
 async function loadSolution(file) {
   try {
-    fresh = performance.now();
     await session.load(file);
     toast("Solution loaded, with its parameters. The solver waits: run it to go on from there.");
   } catch (error) {
@@ -143,8 +140,7 @@ session.addEventListener("telemetry", ({ detail }) => {
 session.addEventListener("status", ({ detail: status }) => {
   transport.show(status);
   solver.show(status.solver);
-  if (!fresh && differs(knobs.values, status.params)) experiments.leave();
-  if (fresh && performance.now() - fresh > 1000) fresh = null;
+  experiments.show(status.params);
   knobs.show(status.params);
   link = linkOf(lab.params, status.params, status.seed);
   writeLink(link);
@@ -167,10 +163,6 @@ session.addEventListener("notice", ({ detail: { state, text } }) => {
     stage.say(text, { warn: true, buttons: state === "recovering" ? {} : again });
   }
 });
-
-function differs(known, params) {
-  return Object.entries(known).some(([name, value]) => params[name] !== value);
-}
 
 // What the reader does ------------------------------------------------------------------------
 

@@ -7,8 +7,9 @@ from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 import pytest
-from playwright.sync_api import BrowserContext, Page, expect
+from playwright.sync_api import BrowserContext, Page, Route, expect
 
+from labs.engine.catalog import find
 from tests.browser.conftest import Visit, screenshot
 from tests.browser.lab_page import LabPage, wait_frames
 from tests.served import Served
@@ -135,6 +136,25 @@ def test_an_experiment_asks_sets_and_tells(page: Page) -> None:
     assert {name: str(params[name]) for name in shown} == shown, "the address tells the settings"
     expect(experiment.locator("details")).to_have_attribute("open", "")
     screenshot(page, "experiment")
+
+
+def test_an_experiment_stays_the_current_one_however_late_its_settings_arrive(page: Page) -> None:
+    lab = LabPage(page, scene=False).open("joint-control")
+    asked: list[Route] = []
+    page.route("**/commands", lambda route: (asked.append(route), route.fulfill(json={})))  # type: ignore[func-returns-value]
+    page.locator(".experiment .try").first.click()
+    current = page.locator(".experiment.current")
+    expect(current).to_have_count(1)
+    for _ in range(4):
+        lab.told()  # still the old settings, for two seconds
+    request = asked[0].request
+    page.request.post(request.url, data=request.post_data_json)
+    lab.told(when=lambda s: s["params"] != find("joint-control").lab.Params().model_dump())
+    wait_frames(page)
+    expect(current).to_have_count(1)
+    lab.value("kp").fill("432")
+    lab.value("kp").press("Enter")
+    expect(current).to_have_count(0)
 
 
 def test_a_shared_link_shows_the_same(page: Page, visit: Visit, served: Served) -> None:

@@ -10,33 +10,24 @@ from typing import Annotated, Literal
 from fastapi import APIRouter, Body, FastAPI, Request
 from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
-from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from labs.engine.catalog import catalog, find
 from labs.engine.record import versions
-from labs.params import Params
-from server import pages, problems, proxy
+from server import pages, problems, proxy, stream
+from server.commands import Command, execute
 from server.guard import Guard
 from server.messages import (
-    Apply,
     Changes,
-    Command,
     CommandLine,
     Health,
     LabInfo,
     NewSession,
     ParamValues,
-    Press,
     SessionInfo,
 )
-from server.sessions import NoSession, Session, Sessions, Unavailable
+from server.sessions import Session, Sessions, Unavailable
 from server.settings import Settings
 from server.supervisor import Supervisor
-from server.viewers import Viewer
-
-SEND_SECONDS = 20.0
-"""A viewer that takes this long for one message has left."""
-ENDED = 4404
 
 MEDIA = {"json": "application/json", "csv": "text/csv", "npz": "application/octet-stream"}
 api = APIRouter(prefix="/api", responses=problems.RESPONSES)
@@ -54,6 +45,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         with tempfile.TemporaryDirectory(prefix="orclab-") as folder:
             app.state.supervisor, app.state.sessions = supervisor, sessions
             app.state.folder = Path(folder)
+            app.state.settings = settings
             supervisor.start()
             sessions.start()
             yield
@@ -71,6 +63,7 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.add_middleware(Guard, settings=settings)
     app.include_router(api)
     app.include_router(health)
+    app.include_router(stream.router)
     app.include_router(proxy.router)
     pages.install(app)
     problems.install(app)
@@ -146,13 +139,7 @@ async def change_params(
 async def command(request: Request, session_id: str, command: Annotated[Command, Body()]) -> None:
     """Run, pause, step, reset, speed, seed, apply, press, view; and of the solver run, pause,
     step, show, pace."""
-    session = _session(request, session_id)
-    if isinstance(command, Apply):
-        defaults: Params = session.entry.lab.Params()
-        defaults.change(command.params)
-    if isinstance(command, Press):
-        session.entry.lab.check_action(command.action)
-    await session.ask(command.command, **command.model_dump(exclude={"command"}))
+    await execute(_session(request, session_id), command)
 
 
 @api.get("/sessions/{session_id}/command")
@@ -211,38 +198,6 @@ async def load_solution(request: Request, session_id: str) -> ParamValues:
         return ParamValues(params=await session.load(str(path)))
     finally:
         path.unlink()
-
-
-@api.websocket("/sessions/{session_id}/stream")
-async def stream(socket: WebSocket, session_id: str) -> None:
-    """What happens in a session: hello, telemetry, status, notices."""
-    await socket.accept()
-    sessions: Sessions = socket.app.state.sessions
-    try:
-        session = sessions.find(session_id)
-    except NoSession as error:
-        await socket.close(ENDED, str(error)[:120])
-        return
-    viewer = session.join()
-    sending = asyncio.create_task(_send(socket, viewer))
-    try:
-        while (await socket.receive())["type"] != "websocket.disconnect":
-            pass  # A page has nothing to say here: it uses the API.
-    except (WebSocketDisconnect, RuntimeError):
-        pass  # It left in the middle of a message.
-    except asyncio.CancelledError:
-        pass  # The server stops and waits no longer.
-    finally:
-        session.leave(viewer)
-        sending.cancel()
-
-
-async def _send(socket: WebSocket, viewer: Viewer) -> None:
-    with contextlib.suppress(WebSocketDisconnect, RuntimeError, TimeoutError):
-        async for payload in viewer.messages():
-            await asyncio.wait_for(socket.send_text(payload.decode()), SEND_SECONDS)
-    with contextlib.suppress(WebSocketDisconnect, RuntimeError):
-        await socket.close(ENDED)
 
 
 async def _file(

@@ -1,4 +1,5 @@
-"""Every message on the wire, typed: the HTTP API, the page's stream, and the worker's pipe.
+"""Messages on the wire, typed: the HTTP API, the page's stream, and the worker's pipe; what a
+session can be told to do is in commands.py.
 
 The API validates what comes in; numbers are finite, sizes bounded. Page and worker messages are
 JSON objects with a `type`."""
@@ -38,106 +39,6 @@ class NewSession(Message):
     """Further parameters, as texts: what a page's address says."""
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
     view: View = View()
-
-
-class Run(Message):
-    """Let simulated time run."""
-
-    command: Literal["run"]
-
-
-class Pause(Message):
-    """Hold simulated time."""
-
-    command: Literal["pause"]
-
-
-class Step(Message):
-    """Pause, and advance by some of the lab's periods."""
-
-    command: Literal["step"]
-    count: Annotated[int, Field(ge=1, le=1000)] = 1
-
-
-class Reset(Message):
-    """Back to t = 0 with the present parameters."""
-
-    command: Literal["reset"]
-
-
-class Speed(Message):
-    """Simulated seconds per second of the wall clock."""
-
-    command: Literal["speed"]
-    factor: Annotated[Finite, Field(ge=0.1, le=4.0)]
-
-
-class Seed(Message):
-    """A new seed; restarts."""
-
-    command: Literal["seed"]
-    seed: Annotated[int, Field(ge=0, le=2**32 - 1)]
-
-
-class Apply(Message):
-    """All parameters to their defaults but for `params` (a preset, an experiment, or none:
-    the defaults); `restart` begins anew at t = 0, and runs."""
-
-    command: Literal["apply"]
-    params: Changes = {}
-    restart: bool = True
-
-
-class Press(Message):
-    """Press one of the lab's actions."""
-
-    command: Literal["press"]
-    action: Annotated[str, Field(max_length=64)]
-
-
-class SetView(Message):
-    """Light or dark, high or low graphics."""
-
-    command: Literal["view"]
-    view: View
-
-
-class SolverRun(Message):
-    """Let the solver run."""
-
-    command: Literal["solver_run"]
-
-
-class SolverPause(Message):
-    """Hold the solver. The world runs on; and holding the world does not hold the solver."""
-
-    command: Literal["solver_pause"]
-
-
-class SolverStep(Message):
-    """Pause the solver, and let it do some iterations."""
-
-    command: Literal["solver_step"]
-    count: Annotated[int, Field(ge=1, le=1000)] = 1
-
-
-class SolverShow(Message):
-    """Pause the solver, and look back at an iteration: the nearest kept one not after it."""
-
-    command: Literal["solver_show"]
-    iteration: Annotated[int, Field(ge=0, le=2**53)]
-
-
-class SolverPace(Message):
-    """Iterations per second at most; 0 for as many as go. It changes no result."""
-
-    command: Literal["solver_pace"]
-    pace: Annotated[Finite, Field(ge=0.0, le=1000.0)]
-
-
-WorldCommand = Run | Pause | Step | Reset | Speed | Seed | Apply | Press | SetView
-SolverCommand = SolverRun | SolverPause | SolverStep | SolverShow | SolverPace
-Command = Annotated[WorldCommand | SolverCommand, Field(discriminator="command")]
 
 
 class SessionInfo(Message):
@@ -191,6 +92,16 @@ class Problem(Message):
 
 
 # The page's stream (server to page) ----------------------------------------------------------
+
+
+class Answer(Message):
+    """To a request that came over the stream."""
+
+    type: Literal["answer"] = "answer"
+    ref: int
+    """The request's own."""
+    error: str = ""
+    """Why it was refused, what is allowed; empty if it was done."""
 
 
 class Hello(Message):

@@ -1,5 +1,6 @@
 """What a refused request answers: a sentence for people, a code for programs."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from fastapi import FastAPI, Request, Response
@@ -49,11 +50,15 @@ async def _lab_error(_: Request, error: Exception) -> Response:
 
 async def _validation_error(_: Request, error: Exception) -> Response:
     assert isinstance(error, RequestValidationError)
+    return _problem(422, describe(error.errors()), "invalid")
+
+
+def describe(errors: Sequence[Any]) -> str:
+    """What a validation found wrong, in sentences for people."""
     sentences = [
-        f"{'.'.join(str(part) for part in e['loc'][1:]) or 'body'}: {e['msg']}"
-        for e in error.errors()[:5]
+        f"{'.'.join(str(part) for part in e['loc'][1:]) or 'body'}: {e['msg']}" for e in errors[:5]
     ]
-    return _problem(422, "; ".join(sentences), "invalid")
+    return "; ".join(sentences)
 
 
 async def _http_error(request: Request, error: Exception) -> Response:

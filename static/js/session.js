@@ -7,6 +7,8 @@
 const BACKOFF = [500, 1000, 2000, 3500, 5000]; // [ms]
 const FULL_RETRY = 10000;
 const PATIENCE = 3000; // What takes longer is explained.
+const FRAME = 16; // [ms]
+const PATIENCE_FOR_ANSWER = 15000; // A worker is given ten seconds.
 const SILENCE = 8000; // A live stream speaks twice a second; after this it is taken for dead.
 
 export class Session extends EventTarget {
@@ -20,6 +22,9 @@ export class Session extends EventTarget {
     this.socket = null;
     this.tries = 0;
     this.closed = false;
+    this.answers = new Map(); // what waits for the server's answer, by its reference
+    this.refs = 0;
+    this.changed = 0; // [ms] when changes were sent last
     this.frame.addEventListener("load", () => {
       this.sceneLoaded = this.info !== null;
       this.goLive();
@@ -96,6 +101,7 @@ export class Session extends EventTarget {
       const message = JSON.parse(event.data);
       if (message.type === "status") this.noteStatus(message);
       if (message.type === "hello") this.noteWorker(message.worker);
+      if (message.type === "answer") this.answers.get(message.ref)?.(message.error);
       this.emit(message.type, message);
       if (message.type === "notice" && message.state === "ended") this.noteEnded(message.text);
     };
@@ -191,6 +197,7 @@ export class Session extends EventTarget {
     const socket = this.socket;
     this.socket = null;
     socket?.close();
+    for (const done of this.answers.values()) done("The connection was lost: try again in a moment.");
   }
 
   leave() {
@@ -208,22 +215,49 @@ export class Session extends EventTarget {
 
   // Commands and changes. Both throw an Error with the server's sentence.
   send(command) {
-    return this.ask("POST", "commands", command);
+    return this.ask({ type: "command", command });
   }
 
+  // What changes within a frame goes as one message: at once, or with the next frame.
   change(changes) {
-    return this.ask("PATCH", "params", changes);
+    if (this.batch) {
+      Object.assign(this.batch.changes, changes);
+      return this.batch.answer;
+    }
+    if (performance.now() - this.changed >= FRAME) return this.sendChanges(changes);
+    const batch = (this.batch = { changes: { ...changes } });
+    batch.answer = new Promise((done) => setTimeout(done, this.changed + FRAME - performance.now())).then(() => {
+      this.batch = null;
+      return this.sendChanges(batch.changes);
+    });
+    return batch.answer;
   }
 
-  // A saved solution, as the file it is.
-  load(file) {
-    return this.ask("PUT", "solution", file);
+  sendChanges(changes) {
+    this.changed = performance.now();
+    return this.ask({ type: "params", changes });
   }
 
-  async ask(method, what, body) {
+  async ask(message) {
     if (!this.info) throw new Error("The simulation is not ready yet.");
-    const { status, data } = await request(method, `/api/sessions/${this.info.id}/${what}`, body);
-    if (status >= 200 && status < 300) return data;
+    if (this.socket?.readyState !== WebSocket.OPEN) throw new Error("The server is not connected. Trying again …");
+    const ref = (this.refs += 1);
+    this.socket.send(JSON.stringify({ ...message, ref }));
+    let timer;
+    const error = await new Promise((done) => {
+      this.answers.set(ref, done);
+      timer = setTimeout(done, PATIENCE_FOR_ANSWER, "The server does not answer.");
+    });
+    clearTimeout(timer);
+    this.answers.delete(ref);
+    if (error) throw new Error(error);
+  }
+
+  // A saved solution, as the file it is: too large for the stream.
+  async load(file) {
+    if (!this.info) throw new Error("The simulation is not ready yet.");
+    const { status, data } = await request("PUT", `/api/sessions/${this.info.id}/solution`, file);
+    if (status >= 200 && status < 300) return;
     if (status === 404) this.retryNow();
     throw new Error(data.error);
   }

@@ -1,13 +1,14 @@
 """A lab's page in a browser: see, drag, press, share, export."""
 
 import csv
+import json
 import re
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
 import numpy as np
 import pytest
-from playwright.sync_api import BrowserContext, Page, Route, expect
+from playwright.sync_api import BrowserContext, Page, WebSocketRoute, expect
 
 from labs.engine.catalog import find
 from tests.browser.conftest import Visit, screenshot
@@ -139,16 +140,31 @@ def test_an_experiment_asks_sets_and_tells(page: Page) -> None:
 
 
 def test_an_experiment_stays_the_current_one_however_late_its_settings_arrive(page: Page) -> None:
+    held: list[str] = []
+
+    def answer_before_it_is_done(socket: WebSocketRoute) -> None:
+        server = socket.connect_to_server()
+
+        def hold(text: str | bytes) -> None:
+            if "apply" in str(text):
+                held.append(str(text))
+                socket.send(
+                    json.dumps({"type": "answer", "error": "", "ref": json.loads(text)["ref"]})
+                )
+            else:
+                server.send(text)
+
+        socket.on_message(hold)
+        page.on("console", lambda message: server.send(held.pop()))
+
+    page.route_web_socket("**/stream", answer_before_it_is_done)
     lab = LabPage(page, scene=False).open("joint-control")
-    asked: list[Route] = []
-    page.route("**/commands", lambda route: (asked.append(route), route.fulfill(json={})))  # type: ignore[func-returns-value]
     page.locator(".experiment .try").first.click()
     current = page.locator(".experiment.current")
     expect(current).to_have_count(1)
     for _ in range(4):
         lab.told()  # still the old settings, for two seconds
-    request = asked[0].request
-    page.request.post(request.url, data=request.post_data_json)
+    page.evaluate("console.log('now')")
     lab.told(when=lambda s: s["params"] != find("joint-control").lab.Params().model_dump())
     wait_frames(page)
     expect(current).to_have_count(1)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from websockets.exceptions import ConnectionClosed
 
 from labs.engine.events import Event
 from labs.engine.headless import run
@@ -41,6 +42,32 @@ def test_changes_are_all_or_nothing(served: Served) -> None:
         assert refused.status_code == 422
         assert refused.json()["error"] == "gain = -1.0: gain takes a number from 0 to 1000 1/s"
         assert served.http.get(session.path).json()["params"]["omega"] == 5.0
+
+
+def test_the_stream_takes_what_the_api_takes(served: Served) -> None:
+    """The page's own way: each message is answered, whatever it is, after what it changed."""
+    with served.session("oscillator") as session, session.stream() as stream:
+
+        def ask(message: dict[str, Any] | str) -> str:
+            text = message if isinstance(message, str) else json.dumps(message)
+            stream.socket.send(text)
+            return str(stream.next("answer")["error"])
+
+        assert ask({"type": "params", "ref": 1, "changes": {"omega": 5.0}}) == ""
+        assert served.http.get(session.path).json()["params"]["omega"] == 5.0
+        error = ask({"type": "params", "ref": 2, "changes": {"omega": 6.0, "gain": -1.0}})
+        assert error == "gain = -1.0: gain takes a number from 0 to 1000 1/s"
+        assert ask({"type": "command", "ref": 3, "command": {"command": "pause"}}) == ""
+        error = ask({"type": "command", "ref": 4, "command": {"command": "press", "action": "no"}})
+        assert "kick" in error
+        for wrong in ("", "[]", "{", '{"type": "params", "ref": -1}', '{"type": "no", "ref": 5}'):
+            assert ask(wrong), wrong
+        stream.socket.send(json.dumps({"type": "command", "ref": 77, "command": "dance"}))
+        assert stream.next("answer")["ref"] == 77, "a wrong one is answered where it belongs"
+        assert served.http.get(session.path).json()["params"]["omega"] == 5.0
+        stream.socket.send("x" * 70_000)
+        with pytest.raises(ConnectionClosed, match="65536"):
+            stream.next("answer")
 
 
 def test_commands_do_what_they_say(served: Served) -> None:

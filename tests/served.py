@@ -89,7 +89,7 @@ class Served:
     @contextlib.contextmanager
     def session(self, lab: str, **more: Any) -> Iterator["Opened"]:
         """A session that is closed at the end."""
-        opened = Opened(self, lab, more)
+        opened = Opened.new(self, lab, more)
         try:
             yield opened
         finally:
@@ -99,12 +99,16 @@ class Served:
 class Opened:
     """A session seen through the API and its stream."""
 
-    def __init__(self, server: Served, lab: str, more: dict[str, Any]) -> None:
-        self.server = server
+    def __init__(self, server: Served, info: dict[str, Any]) -> None:
+        """`info`: of a session that was opened elsewhere, by a page."""
+        self.server, self.info = server, info
+        self.path = f"/api/sessions/{info['id']}"
+
+    @classmethod
+    def new(cls, server: Served, lab: str, more: dict[str, Any]) -> Self:
         answer = server.http.post("/api/sessions", json={"lab": lab, **more})
         assert answer.status_code == 201, answer.text
-        self.info: dict[str, Any] = answer.json()
-        self.path = f"/api/sessions/{self.info['id']}"
+        return cls(server, answer.json())
 
     def set(self, **params: Any) -> httpx.Response:
         return self.server.http.patch(f"{self.path}/params", json=params)

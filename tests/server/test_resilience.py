@@ -160,7 +160,7 @@ def test_the_first_start_may_take_its_time(tmp_path: Path) -> None:
         ThreadPoolExecutor() as pool,
     ):
         assert server.health()["preparing"]
-        opening = pool.submit(Opened, server, "oscillator", {})
+        opening = pool.submit(Opened.new, server, "oscillator", {})
         until(lambda: server.health()["sessions"] == 1)
         asked = time.monotonic()
         assert server.process.stdout is not None
@@ -197,7 +197,7 @@ def test_a_server_ends_quietly_though_its_viewers_worker_is_stuck(mortal: Served
     said = Path(mortal.stderr.name)
     before = said.stat().st_size
     (worker,) = mortal.listeners()  # the spare, which the session takes
-    session = Opened(mortal, "oscillator", {})
+    session = Opened.new(mortal, "oscillator", {})
     viewers = [SceneClient(session) for _ in range(5)]
     os.kill(worker, signal.SIGSTOP)
     mortal.stop()

@@ -143,8 +143,10 @@ def test_numbers_follow_the_solver_while_the_world_stands_still(served: Served) 
         columns = stream.next("hello")["columns"]
         at = columns.index("best")
         session.command("solver_pause")
+        session.command("reset")  # it may have done all its iterations by then
+        stream.next("status", lambda s: s["solver"]["latest"] == 0)
         session.command("solver_step", count=3)
-        before = stream.next("telemetry", lambda m: m["now"])["now"][at]
+        before = stream.next("telemetry", lambda m: m["now"] and m["now"][at] < 5.5)["now"][at]
         session.command("solver_step", count=50)
         assert stream.next("telemetry", lambda m: m["now"] and m["now"][at] < before)
         session.command("solver_show", iteration=1)

@@ -53,6 +53,15 @@ class Arm:
     """Where a viewer stands and what it looks at [m]."""
 
 
+TITLES = {
+    "ur5": "UR5",
+    "panda": "Franka Panda",
+    "double-pendulum": "Double pendulum",
+    "scara": "SCARA",
+}
+"""Known before an arm is loaded, which takes its meshes with it."""
+
+
 @cache
 def ur5() -> Arm:
     """UR5, 6 joints. Reflected rotor inertia: gear 101 with J = 2.5e-5 kg m^2 gives
@@ -61,7 +70,7 @@ def ur5() -> Arm:
     model.armature = np.array([0.255, 0.255, 0.255, 0.061, 0.061, 0.061])
     return Arm(
         name="ur5",
-        title="UR5",
+        title=TITLES["ur5"],
         model=model,
         home=np.array([0.0, -1.5, 1.6, -1.67, -1.57, 0.0]),
         torque_limit=model.effortLimit.copy(),
@@ -84,7 +93,7 @@ def panda() -> Arm:
     model.armature = np.full(model.nv, 0.1)
     return Arm(
         name="panda",
-        title="Franka Panda",
+        title=TITLES["panda"],
         model=model,
         home=np.array([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]),
         torque_limit=model.effortLimit.copy(),
@@ -118,7 +127,7 @@ def double_pendulum() -> Arm:
     tip = model.addFrame(pin.Frame("tip", parent, hinge, pin.FrameType.OP_FRAME))
     return Arm(
         name="double-pendulum",
-        title="Double pendulum",
+        title=TITLES["double-pendulum"],
         model=model,
         home=np.array([0.9, 0.6]),
         torque_limit=np.array([100.0, 50.0]),
@@ -175,7 +184,7 @@ def scara() -> Arm:
     tip = model.addFrame(pin.Frame("tip", tool, translation(0, 0, -0.05), pin.FrameType.OP_FRAME))
     return Arm(
         name="scara",
-        title="SCARA",
+        title=TITLES["scara"],
         model=model,
         home=np.array([-0.4, 1.2, 0.0, -0.8]),
         torque_limit=limit,

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from labs.models.arms import load
+from labs.models.arms import TITLES
 from labs.params import Effect, Group, Params
 
 MAX_JOINTS = 7
@@ -14,7 +14,7 @@ MAX_JOINTS = 7
 
 def robot_choice(group: Group, names: Sequence[str], *, effect: Effect | None = None) -> Any:
     """One of the arms of these names (`labs.models.arms`), at first the first."""
-    titles = {name: load(name).title for name in names}
+    titles = {name: TITLES[name] for name in names}
     return group.choice(names[0], titles, "Robot", effect=effect)
 
 

@@ -14,6 +14,7 @@ import { Stage } from "./stage.js";
 import { wireTips } from "./tips.js";
 import { toast } from "./toast.js";
 import { Transport } from "./transport.js";
+import { noteVisit } from "./visits.js";
 
 const lab = JSON.parse(document.getElementById("lab-data").textContent);
 const session = new Session(lab, document.getElementById("robot"), readLink(), view);
@@ -191,4 +192,5 @@ wirePreferences();
 wireMenus();
 wireTips(lab, (name) => knobs.values[name] ?? lab.params.find((p) => p.name === name).default);
 wireKeyboard(actions);
+noteVisit(lab.slug);
 session.create();

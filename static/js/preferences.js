@@ -1,23 +1,9 @@
-// What the reader prefers for looks: theme and graphics. Kept in this browser, never on a server.
+// What the reader prefers for looks: theme and graphics.
+
+import { store, stored } from "./store.js";
 
 const systemDark = matchMedia("(prefers-color-scheme: dark)");
 const listeners = new Set();
-
-function stored(key) {
-  try {
-    return localStorage.getItem(key);
-  } catch {
-    return null;
-  }
-}
-
-function store(key, value) {
-  try {
-    localStorage.setItem(key, value);
-  } catch {
-    // Storage may be forbidden; the choice then lasts as long as the page.
-  }
-}
 
 // Drawing in software (no graphics card) is slow with shadows and environment light.
 function drawsInSoftware() {

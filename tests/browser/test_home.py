@@ -13,10 +13,16 @@ def test_the_course_lies_open(page: Page) -> None:
     expect(card).to_be_visible()
     picture = card.locator("img")
     assert picture.evaluate("img => img.decode().then(() => img.naturalWidth)") >= 400
-    screenshot(page, "home")
+    expect(page.locator("#go-on")).to_be_hidden()
     card.click()
     expect(page).to_have_url(re.compile("/labs/joint-control"))
     expect(page.get_by_role("heading", level=1)).to_have_text("Joint motion control")
+    page.goto("/")
+    expect(page.locator(".step.opened")).to_have_count(1)
+    expect(page.locator("#chapter-1 .progress")).to_have_text(re.compile("1 of"))
+    screenshot(page, "home")
+    go_on = page.get_by_role("link", name="Go on with Joint motion control")
+    expect(go_on).to_have_attribute("href", re.compile("/labs/joint-control$"))
 
 
 def test_search_filters_by_word_as_one_types(page: Page) -> None:

@@ -1,25 +1,11 @@
-"""Articles: a lab's Markdown to HTML with the mathematics as MathML and experiments as cards.
-
-An experiment is a fenced block with the info string `experiment` that holds TOML:
-
-    title = "PD alone sags"
-    question = "Where will the arm come to rest?"    # Markdown; asks for a prediction first
-    observe = "The error stays at $e = g / k_p$."    # Markdown; shown once the button is pressed
-    button = "Try it"
-    watch = "Error"                                  # optional: a plot's title
-    [set]
-    controller = "pd"                                # all other parameters take their defaults
-"""
+"""Articles: a lab's Markdown to HTML with the mathematics as MathML and experiments as cards."""
 
 import re
-import tomllib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cache, lru_cache
-from html import escape
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
-import math_core
 from markdown_it import MarkdownIt
 from markdown_it.renderer import RendererHTML
 from markdown_it.token import Token
@@ -28,41 +14,16 @@ from mdit_py_plugins.dollarmath import dollarmath_plugin
 
 from labs.engine.catalog import Entry
 from labs.errors import LabError
-from labs.params import Params, Value
-
-_math = math_core.LatexToMathML(fancy_error=False)
-
-
-class ArticleError(LabError):
-    """An article has bad TeX, or an experiment its lab cannot run."""
-
-
-@dataclass(frozen=True)
-class Experiment:
-    """A question, the settings that answer it, and what to look for. Texts are HTML."""
-
-    title: str
-    question: str
-    observe: str
-    button: str
-    watch: str = ""
-    settings: Mapping[str, Value] = field(default_factory=dict)
+from labs.params import Params
+from server import experiments
+from server.experiments import Experiment
+from server.formulas import ArticleError, tex
 
 
 @dataclass(frozen=True)
 class Article:
     html: str
     experiments: tuple[Experiment, ...]
-
-
-@lru_cache(maxsize=1024)
-def tex(source: str, display: bool = False) -> str:
-    """MathML of a TeX formula. Raises ArticleError."""
-    try:
-        return _math.convert_with_local_state(source, displaystyle=display)
-    except math_core.LatexError as error:
-        reason = re.sub(r"\x1b\[[0-9;]*m", "", str(error)).strip()
-        raise ArticleError(f"bad TeX {source!r}: {reason}") from None
 
 
 @cache
@@ -89,7 +50,7 @@ class _Writer:
     """Renders one article; collects its experiments in order."""
 
     def __init__(self, entry: Entry) -> None:
-        self.lab = entry.lab
+        self.entry = entry
         self.experiments: list[Experiment] = []
         self.symbols = _Symbols(entry.lab.Params)
         self.markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
@@ -134,47 +95,13 @@ class _Writer:
                 options,
                 env,
             )
-        experiment = self._experiment(tokens[i].content)
+        experiment = experiments.read(self.entry, tokens[i].content, self._text)
         self.experiments.append(experiment)
-        return _card(experiment, len(self.experiments))
+        return experiments.card(experiment, len(self.experiments))
 
-    def _experiment(self, source: str) -> Experiment:
-        try:
-            data = tomllib.loads(source)
-        except tomllib.TOMLDecodeError as error:
-            raise ArticleError(f"an experiment is not TOML: {error}") from None
-        name = f"experiment {data.get('title', '')!r}"
-        texts = ("title", "question", "observe", "button", "watch")
-        unknown = sorted(set(data) - {*texts, "set"})
-        missing = [key for key in texts if key != "watch" and not data.get(key)]
-        if unknown or missing:
-            raise ArticleError(
-                f"{name}: needs title, question, observe and button, may have watch and [set]"
-                + (f"; lacks {', '.join(missing)}" if missing else "")
-                + (f"; does not know {', '.join(unknown)}" if unknown else "")
-            )
-        wrong = [key for key in texts if not isinstance(data.get(key, ""), str)]
-        settings = data.get("set", {})
-        if wrong or not isinstance(settings, dict):
-            raise ArticleError(f"{name}: {', '.join(wrong) or 'set'} has the wrong type")
-        self._check(name, settings, data.get("watch", ""))
-        return Experiment(
-            data["title"],
-            self.markdown.render(_escape_number(data["question"])),
-            self.markdown.render(_escape_number(data["observe"])),
-            data["button"],
-            data.get("watch", ""),
-            settings,
-        )
-
-    def _check(self, name: str, settings: Mapping[str, Value], watch: str) -> None:
-        try:
-            self.lab.Params().change(settings)
-        except LabError as error:
-            raise ArticleError(f"{name}: {error}") from None
-        titles = [plot.title for plot in self.lab.plots if hasattr(plot, "title")]
-        if watch and watch not in titles:
-            raise ArticleError(f"{name}: no plot has the title {watch!r}; there are {titles}")
+    def _text(self, markdown: str) -> str:
+        """HTML of a text within an experiment."""
+        return str(self.markdown.render(_escape_number(markdown)))
 
 
 class _Symbols:
@@ -207,17 +134,3 @@ def _escape_number(text: str) -> str:
 
 def _inner(formula: str) -> str:
     return re.sub(r"^<math[^>]*>|</math>$", "", formula)
-
-
-def _card(experiment: Experiment, number: int) -> str:
-    """The card of an experiment. Before the button is pressed it asks; then it tells."""
-    return f"""<section class="experiment" id="experiment-{number}" data-experiment="{number - 1}"
- aria-labelledby="experiment-{number}-title">
-<header><span class="number" aria-hidden="true">{number}</span>
-<h3 id="experiment-{number}-title">{escape(experiment.title)}</h3></header>
-<div class="question">{experiment.question}</div>
-<button type="button" class="primary try">{escape(experiment.button)}</button>
-<details><summary>What to look for</summary>
-<div class="observe">{experiment.observe}</div></details>
-</section>
-"""

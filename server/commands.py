@@ -48,13 +48,30 @@ class Seed(Message):
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)]
 
 
+class Compare(Message):
+    """A run made first, as fast as it goes and with the session's seed, to compare with."""
+
+    params: Changes
+    """As of `Apply`: all others have their defaults."""
+    seconds: Annotated[Finite, Field(gt=0.0, le=120.0)]
+    """How far it goes."""
+
+
 class Apply(Message):
     """All parameters to their defaults but for `params` (a preset, an experiment, or none:
-    the defaults); `restart` begins anew at t = 0, and runs."""
+    the defaults); `restart` begins anew at t = 0, and runs. Speed and pace stay as they are
+    unless given."""
 
     command: Literal["apply"]
     params: Changes = Field(default_factory=dict)
     restart: bool = True
+    speed: Annotated[Finite, Field(ge=0.1, le=4.0)] | None = None
+    """As of `Speed`."""
+    pace: Annotated[Finite, Field(ge=0.0, le=1000.0)] | None = None
+    """As of `SolverPace`."""
+    hold: Annotated[Finite, Field(gt=0.0)] | None = None
+    """[s] When this run pauses, once: a restart forgets it."""
+    compare: Compare | None = None
 
 
 class Press(Message):
@@ -115,6 +132,7 @@ async def execute(session: Session, command: Command) -> None:
     if isinstance(command, Apply):
         defaults: Params = lab.Params()
         defaults.change(command.params)
+        defaults.change(command.compare.params if command.compare else {})
     if isinstance(command, Press):
         lab.check_action(command.action)
     await session.ask(command.command, **command.model_dump(exclude={"command"}))

@@ -10,23 +10,27 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import viser
 
 from labs.engine.catalog import find
+from labs.engine.headless import run
 from labs.engine.run import World
 from labs.engine.solution import Solution
 from labs.errors import LabError
 from server.broadcast import FRAME, Broadcast, Controls
 from server.mailbox import Item, Mailbox
-from server.messages import View
+from server.messages import Compared, View
 from server.pacing import Pacer
 from server.panel import Panel
-from server.pipe import CONTROL, Link
+from server.pipe import CONTROL, STREAM, Link
 from server.solver_clock import SolverClock
 from server.viser_scene import ViserScene
 
 BUSY = 0.8 * FRAME
 """[s] What the world, and then the solver, may compute in a frame."""
+COMPARED_ROWS = 600
+"""Of a run compared with: about one a pixel of a plot."""
 
 log = logging.getLogger("orclab.worker")
 
@@ -58,6 +62,7 @@ class LiveSession:
             with self._guard():
                 if self.controls.moving:
                     self.pacer.advance(now, until=now + BUSY)
+                    self._hold_if_due()
                 if not self.controls.failure:
                     self.solver.iterate(now, until=now + BUSY)
             with self._guard():
@@ -93,15 +98,50 @@ class LiveSession:
         self._changed(restarted=self.world.runs != runs)
         return self.world.params.model_dump()
 
-    def _do_apply(self, params: dict[str, Any], restart: bool) -> dict[str, Any]:
-        defaults = self.world.lab.Params().model_dump()
-        answer = self._do_params(defaults | params)
+    def _do_apply(
+        self,
+        params: dict[str, Any],
+        restart: bool,
+        speed: float | None,
+        pace: float | None,
+        hold: float | None,
+        compare: dict[str, Any] | None,
+    ) -> dict[str, Any]:
+        compared = self._make_comparison(**compare) if compare else None
+        answer = self._do_params(self.world.lab.Params().model_dump() | params)
+        if speed is not None:
+            self._do_speed(speed)
+        if pace is not None and self.world.lab.has_solver():
+            self.solver.dispatch("pace", pace=pace)
         if restart:
             self._do_reset()
             self._do_run()
             if self.world.lab.has_solver():
                 self.solver.dispatch("run")
+        self.pacer.hold = hold
+        if compared:
+            self.link.send(STREAM, Compared(self.world.runs, *compared))
         return answer
+
+    def _make_comparison(
+        self, params: dict[str, Any], seconds: float
+    ) -> tuple[list[str], np.ndarray]:
+        """Another world's run, which leaves this one's recording and events alone."""
+        recorder = run(
+            self.world.entry.slug,
+            params,
+            seconds=seconds,
+            seed=self.world.seed,
+            progress=lambda part: self.broadcast.send_due_status(time.perf_counter()),
+        ).recorder
+        rows = recorder.since(0).astype("float32")
+        return recorder.columns, rows[:: 1 + len(rows) // COMPARED_ROWS]
+
+    def _hold_if_due(self) -> None:
+        if self.pacer.is_held():
+            self.pacer.hold = None
+            self._do_pause()
+            self.broadcast.request_update()
 
     def _do_run(self) -> None:
         self.controls.running = True
@@ -180,6 +220,7 @@ class LiveSession:
     def _changed(self, restarted: bool) -> None:
         self.panel.show(self.world.params)
         if restarted:
+            self.pacer.hold = None
             self.pacer.anchor()
 
     # When the lab itself breaks -----------------------------------------------------------------

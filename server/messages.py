@@ -132,6 +132,18 @@ class Telemetry:
     type: Literal["telemetry"] = "telemetry"
 
 
+@dataclass(frozen=True)
+class Compared:
+    """The run that an experiment compares with, made before its own."""
+
+    run: int
+    """The run that it stands beside."""
+    columns: list[str]
+    rows: np.ndarray
+    """(k, columns), as many as a plot can show."""
+    type: Literal["compared"] = "compared"
+
+
 class SolverStatus(Message):
     """How the solver stands."""
 

@@ -17,6 +17,8 @@ class Pacer:
     def __init__(self, world: World, speed: float) -> None:
         self.speed = speed
         """Simulated seconds per second of the wall clock that are wanted."""
+        self.hold: float | None = None
+        """[s] The simulated time at which the world stops for its viewers, if any."""
         self._world = world
         self._samples: deque[tuple[float, float]] = deque(maxlen=4)
         self.anchor()
@@ -36,7 +38,7 @@ class Pacer:
         """The steps that are due; none begins after `until` [s]."""
         before = self._world.steps
         for _ in range(int(self._steps_due(now))):
-            if self._world.trouble or time.perf_counter() > until:
+            if self._world.trouble or self.is_held() or time.perf_counter() > until:
                 break
             self._world.advance()
         self._spent += time.perf_counter() - now
@@ -44,6 +46,11 @@ class Pacer:
         lag = self._steps_due(now) * self._world.lab.period / self.speed
         if lag > SLIP:
             self._wall0 += lag - SLIP
+
+    def is_held(self) -> bool:
+        """Whether the time to hold has come: exactly, however fast it went."""
+        steps = None if self.hold is None else round(self.hold / self._world.lab.period)
+        return self._world.steps == steps
 
     def measure(self, now: float) -> float | None:
         """The real-time factor over the last seconds; None while it is not known."""

@@ -18,7 +18,9 @@ from starlette.types import Scope
 from labs import plots
 from labs.engine.catalog import Entry, catalog
 from labs.params import Params
-from server.articles import render, tex, words
+from server.articles import render, words
+from server.experiments import PACES, WINDOWS
+from server.formulas import tex
 
 STATIC = Path(__file__).parent.parent / "static"
 
@@ -137,10 +139,7 @@ def lab_data(entry: Entry) -> dict[str, Any]:
         "plots": [_with_mathml(plots.describe(plot)) for plot in lab.plots],
         "presets": {name: dict(values) for name, values in lab.presets.items()},
         "actions": [vars(action) for action in lab.actions],
-        "experiments": [
-            {"title": e.title, "watch": e.watch, "set": dict(e.settings)}
-            for e in render(entry).experiments
-        ],
+        "experiments": [experiment.describe() for experiment in render(entry).experiments],
         "period": lab.period,
         "has_world": lab.has_world(),
         "has_solver": lab.has_solver(),
@@ -203,6 +202,7 @@ def _templates() -> Environment:
         lstrip_blocks=True,
     )
     environment.globals.update(vendor=vendor_url, version=own_version(), words=words)
+    environment.globals.update(paces=PACES, windows=WINDOWS)
     environment.filters["tex"] = lambda source: Markup(tex(source))
     environment.filters["number"] = lambda value: f"{value:.6g}".replace("-", "\u2212")
     return environment

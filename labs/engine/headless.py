@@ -27,7 +27,8 @@ def run(
     `events` are applied before the step they name. A lab with a solver is solved to the end
     before time starts and after each change, unless `events` say how far. It starts from a
     `solution`, if given, with its parameters but for the `changes`, and its seed (else 0). A
-    solution that is done is not solved further. `progress` hears the part done in [0, 1]."""
+    solution that is done is not solved further. `progress` hears the part of the steps done in
+    [0, 1], again and again."""
     entry = find(slug)
     period = entry.lab.period
     if not 0 <= seconds <= MAX_STEPS * period:
@@ -40,18 +41,23 @@ def run(
         solution = _with_changes(entry, solution, changes or {}, seed)
     world = World(entry, changes, seed or 0, steps + 1, solution)
     iterations_given = any(event.name == "iterate" for event in todo if event.kind == "solve")
+
+    def heard() -> None:
+        if progress:
+            progress(world.steps / max(steps, 1))
+
     for step in range(steps + 1):
         while todo and todo[0].step <= step:
             if todo[0].name == "show" and not iterations_given:
-                _solve(world)
+                _solve(world, heard)
             _apply(world, todo.pop(0))
         if not iterations_given:
-            _solve(world)
+            _solve(world, heard)
         if step == steps or world.trouble:
             break
         world.advance()
-        if progress and step % 100 == 0:
-            progress(step / steps)
+        if step % 100 == 0:
+            heard()
     if todo:
         last = max(event.step for event in todo) * period
         if not world.trouble:
@@ -59,10 +65,11 @@ def run(
     return world
 
 
-def _solve(world: World) -> None:
-    """To the end, unless a loaded solution was there already."""
+def _solve(world: World, heard: Callable[[], None]) -> None:
+    """To the end, unless a loaded solution was there already; `heard` after every iteration."""
     while world.solving and not (world.latest and world.latest.done):
         world.iterate()
+        heard()
 
 
 def _with_changes(

@@ -22,7 +22,7 @@ from labs.errors import ParameterError
 from labs.lab import Action, Inputs, Snapshot, State
 from labs.params import Choice, Knob, Params, Text, Toggle, Value
 from labs.plots import Bars, Curves, HeatMap, Matrix, Note, Readout, TimeSeries, Trace
-from server.articles import tex
+from server.formulas import tex
 from tests.labs.contract import (
     ENTRIES,
     LOOKED_AT,

@@ -5,7 +5,8 @@ import dataclasses
 import pytest
 
 from labs.engine.catalog import Entry, catalog
-from server.articles import Article, ArticleError, render, render_text, tex, words
+from server.articles import Article, render, render_text, words
+from server.formulas import ArticleError, tex
 
 COURSE = [entry for entry in catalog().values() if entry.package.startswith("labs.")]
 EXPERIMENT = """```experiment
@@ -87,7 +88,7 @@ def test_a_symbol_with_a_slider_names_it(entry: Entry) -> None:
 def test_an_experiment_is_read_and_shown(entry: Entry) -> None:
     article = write(entry, experiment('watch = "Error"\n[set]\nkp = 200.0\n'))
     (found,) = article.experiments
-    assert (found.title, found.button, found.watch) == ("Sag", "Try <it>", "Error")
+    assert (found.title, found.button, found.watch) == ("Sag", "Try <it>", ("Error",))
     assert dict(found.settings) == {"kp": 200.0}
     assert "<math>" in found.question
     assert "<strong>stays</strong>" in found.observe

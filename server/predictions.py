@@ -169,7 +169,7 @@ def form(predict: Prediction | None, number: int) -> str:
 
 
 def _form(kind: str, ask: str, inside: str, number: int) -> str:
-    return f"""<form class="predict {kind}" aria-labelledby="ask-{number}">
+    return f"""<form class="predict" data-kind="{kind}" aria-labelledby="ask-{number}">
 <p class="ask" id="ask-{number}">{ask}</p>
 <div class="guess">{inside}</div></form>
 """

@@ -23,7 +23,7 @@ const board = new Board(lab);
 const transport = new Transport(send);
 const solver = new SolverRow(send, loadSolution);
 const knobs = new Knobs(lab, (changes) => session.change(changes));
-const experiments = new Experiments(lab, apply, (title) => board.watch(title), (names) => knobs.highlight(names));
+const experiments = new Experiments(lab, apply, board, (names) => knobs.highlight(names));
 let link = location.href;
 
 // A command whose refusal is said at the bottom of the page. Tells whether it was done.
@@ -37,8 +37,8 @@ async function send(command) {
   }
 }
 
-function apply(params) {
-  return send({ command: "apply", params, restart: true });
+function apply(params, how = {}) {
+  return send({ command: "apply", params, restart: true, ...how });
 }
 
 const actions = {
@@ -111,7 +111,7 @@ session.addEventListener("phase", ({ detail: { phase, text } }) => {
   const live = phase === "live";
   transport.enable(live);
   solver.enable(live);
-  for (const button of document.querySelectorAll(".try")) button.disabled = !live;
+  for (const button of document.querySelectorAll(".try, .predict button")) button.disabled = !live;
   if (["worker", "robot", "live"].includes(phase)) {
     stage.progress(phase);
     stage.say("");
@@ -131,6 +131,8 @@ session.addEventListener("refused", ({ detail }) => {
   toast(`The link was not taken: ${sentence} The lab starts with its defaults.`, 15);
 });
 
+session.addEventListener("compared", ({ detail }) => board.compare(detail));
+
 session.addEventListener("hello", ({ detail }) => board.hello(detail));
 
 session.addEventListener("telemetry", ({ detail }) => {
@@ -141,7 +143,7 @@ session.addEventListener("telemetry", ({ detail }) => {
 session.addEventListener("status", ({ detail: status }) => {
   transport.show(status);
   solver.show(status.solver);
-  experiments.show(status.params);
+  experiments.show(status);
   knobs.show(status.params);
   link = linkOf(lab.params, status.params, status.seed);
   writeLink(link);

@@ -2,6 +2,8 @@
 
 import { store, stored } from "./store.js";
 
+import { store, stored } from "./storage.js";
+
 const systemDark = matchMedia("(prefers-color-scheme: dark)");
 const listeners = new Set();
 

@@ -93,6 +93,37 @@ def test_commands_do_what_they_say(served: Served) -> None:
         stream.next("telemetry", lambda m: m["rows"] and m["rows"][-1][5] == 1.0)
 
 
+def test_an_experiment_is_one_command(served: Served) -> None:
+    """It sets speed and pace, makes the run it compares with, and holds exactly then, once."""
+    with served.session("oscillator", seed=5) as session, session.stream() as stream:
+        noisy = {"noisy": True}
+        other = {"params": noisy, "seconds": 2.0}
+        how = {"speed": 4.0, "pace": 2.0, "hold": 0.53, "compare": other}
+        assert session.command("apply", params={"omega": 7.0}, **how).status_code == 204
+        compared = stream.next("compared")
+        held = stream.next("status", lambda s: s["run"] == compared["run"] and not s["running"])
+        assert held["t"] == pytest.approx(0.53, abs=1e-9)
+        assert (held["speed"], held["solver"]["pace"], held["params"]["noisy"]) == (4, 2, False)
+        alone = run("oscillator", noisy, seconds=2.0, seed=5).recorder
+        assert compared["columns"] == alone.columns
+        np.testing.assert_array_equal(
+            np.array(compared["rows"], "float32"), alone.since(0).astype("float32")
+        )
+        exported = session.server.http.get(f"{session.path}/export.json").json()
+        assert {change["kind"] for change in exported["changes"]} <= {"solve"}, (
+            "nothing of the hold"
+        )
+        session.command("run")
+        stream.next("status", lambda s: s["running"] and s["t"] > 0.6)
+        session.command("apply", hold=5.0)
+        session.command("reset")
+        session.command("apply", speed=1.0, pace=0.0)
+        after = stream.next("status", lambda s: s["t"] > 0.2 and s["speed"] == 1)
+        assert after["running"]
+        assert session.command("apply", compare=other | {"params": {"noisy": 7}}).status_code == 422
+        assert session.command("apply", hold=-1.0).status_code == 422
+
+
 def test_an_answer_comes_after_what_it_answers(served: Served) -> None:
     """Whoever has the answer to a command finds the session changed."""
     with served.session("oscillator") as session:

@@ -96,6 +96,61 @@ def test_an_experiment_is_read_and_shown(entry: Entry) -> None:
     assert found.observe in article.html
 
 
+def test_an_experiment_says_what_makes_its_promise_visible(entry: Entry) -> None:
+    more = """watch = ["Error", "Torque"]
+highlight = "RMS error"
+window = 3
+hold = 2.5
+speed = 0.5
+[set]
+ki = 0.0
+[compare]
+kp = 400.0"""
+    (found,) = write(entry, experiment(more)).experiments
+    told = found.describe()
+    assert told["watch"] == ("Error", "Torque")
+    assert (told["highlight"], told["window"], told["seconds"]) == ("RMS error", 3.0, 2.5)
+    other = {"params": {"ki": 0.0, "kp": 400.0}, "seconds": 2.5}
+    assert told["run"] == {"speed": 0.5, "pace": 0.0, "hold": 2.5, "compare": other}
+    assert "<mi>k</mi><mi>p</mi></msub></math> = 400 N·m/rad" in found.compared
+
+
+def test_what_an_experiment_does_not_say_has_its_default(entry: Entry) -> None:
+    (found,) = write(entry, experiment("")).experiments
+    assert found.describe() == {
+        "title": "Sag",
+        "set": {},
+        "watch": (),
+        "highlight": "",
+        "window": 10.0,
+        "seconds": 10.0,
+        "run": {"speed": 1.0, "pace": 0.0, "hold": None, "compare": None},
+        "predict": None,
+    }
+
+
+CHOICE = '[predict]\nchoices = ["sags by $g/k_p$", "rises"]\nanswer = 0'
+NUMBER = '[predict]\nask = "Error"\nunit = "rad"\n'
+CURVE = 'watch = "Error"\n[predict]\nask = "Sketch it"\ncurve = "error[1]"\nrange = [-1, 1]'
+
+
+@pytest.mark.parametrize(
+    ("more", "told", "shown"),
+    [
+        (CHOICE, {"kind": "choice", "answer": 0}, 'data-choice="1" aria-pressed="false">rises<'),
+        (NUMBER + 'channel = "error[1]"', {"channel": "error[1]", "of": "last"}, 'inputmode="dec'),
+        (NUMBER + 'readout = "RMS error"', {"channel": "rms_error", "unit": "rad"}, "Error</p>"),
+        (NUMBER + "answer = 3", {"kind": "number", "channel": "", "answer": 3.0}, ">rad<"),
+        (CURVE, {"plot": "Error", "unit": "rad", "range": (-1.0, 1.0)}, "Sketch it</p>"),
+    ],
+)
+def test_a_prediction_is_asked_for(entry: Entry, more: str, told: object, shown: str) -> None:
+    article = write(entry, experiment(more))
+    asked = article.experiments[0].describe()["predict"]
+    assert {key: asked[key] for key in told} == told  # type: ignore[attr-defined]
+    assert shown in article.html
+
+
 def test_titles_are_escaped(entry: Entry) -> None:
     assert "<i>" not in write(entry, experiment(title="<i>Sag</i>")).html
 
@@ -108,6 +163,29 @@ def test_titles_are_escaped(entry: Entry) -> None:
         ("[set]\nkp = true", "kp takes a number from"),
         ('[set]\ncontroller = "magic"', "controller takes one of"),
         ('watch = "no such plot"', "no plot has the title 'no such plot'"),
+        ('watch = ["Error", "Erro"]', "no plot has the title 'Erro'; there are ['Position'"),
+        ('watch = ["Error", "Torque", "Energy"]', "watch takes 2 titles at most, not 3"),
+        ('highlight = "Peak"', "no read-out has the label 'Peak'; there are ['RMS error'"),
+        ("window = -1", "window = -1: takes a number from 0 to 120"),
+        ("hold = 0", "hold = 0: takes a number from 0.01 to 120"),
+        ('hold = "2 s"', "hold = '2 s': takes a number from 0.01 to 120"),
+        ("speed = 8", "speed = 8: takes a number from 0.1 to 4"),
+        ("pace = 7", "pace = 7: the page has 0, 30, 10, 5, 2, 1"),
+        ("pace = 5", "pace is for labs with a solver"),
+        ("[compare]\nkp = -1.0", "kp takes a number from"),
+        ("[predict]\nanswer = 0", "predict: needs ask, unit"),
+        ('[predict]\nchoices = ["a"]\nanswer = 0', "choices takes 2 to 5 texts, not 1"),
+        ('[predict]\nchoices = ["a", "b"]\nanswer = 2', "answer = 2: takes a whole number, 0 to 1"),
+        (NUMBER, "takes one of readout, channel, answer; has none"),
+        (NUMBER + "answer = 1\nchannel = 'error'", "has channel and answer"),
+        (NUMBER + "readout = 'RMS'", "no read-out has the label 'RMS'"),
+        (
+            NUMBER + "channel = 'eror'",
+            "no time series shows the channel 'eror'; there are ['error'",
+        ),
+        (NUMBER + "channel = 'error'\nof = 'mean'", "takes one of last, min, max, peak"),
+        (CURVE.replace("Error", "Energy"), "no time series that is watched shows the channel"),
+        (CURVE.replace("-1, 1", "1, -1"), "range = [1, -1]: takes two numbers, [lowest, highest]"),
         ("wach = 1", "does not know wach"),
         ("watch = 1", "watch has the wrong type"),
         ("set = 1", "set has the wrong type"),
@@ -120,6 +198,12 @@ def test_an_experiment_its_lab_cannot_run_is_refused(
     with pytest.raises(ArticleError, match="joint-control") as caught:
         write(entry, experiment(more))
     assert sentence in str(caught.value)
+
+
+@pytest.mark.parametrize("more", ["hold = 1.0", "[compare]\nrate = 0.02"])
+def test_what_needs_time_is_refused_where_none_runs(more: str) -> None:
+    with pytest.raises(ArticleError, match="is for labs in which time runs"):
+        write(catalog()["descent"], experiment(more))
 
 
 @pytest.mark.parametrize("key", ["title", "question", "observe", "button"])

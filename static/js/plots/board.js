@@ -23,6 +23,8 @@ export class Board {
     this.window = 10;
     this.zoomed = null;
     this.selection = {};
+    this.guess = null; // what the reader predicted: {channel, level} or {channel, x, y}
+    this.compared = null; // the run an experiment compares with, and beside which run
     this.readouts = new Readouts(lab.plots.filter((p) => p.kind === "Readout"), document.getElementById("tiles"));
     this.plots = lab.plots.filter((p) => p.kind in KINDS).map((p) => new KINDS[p.kind](p, this));
     document.getElementById("plots").append(...this.plots.map((plot) => plot.section));
@@ -31,11 +33,8 @@ export class Board {
     this.pictured = this.plots.filter((plot) => plot.update);
     this.unzoomButton = document.getElementById("unzoom");
     this.unzoomButton?.addEventListener("click", () => this.unzoom());
-    const select = document.getElementById("window");
-    select?.addEventListener("change", () => {
-      this.window = Number(select.value);
-      this.unzoom();
-    });
+    const select = (this.windowMenu = document.getElementById("window"));
+    select?.addEventListener("change", () => this.setWindow(Number(select.value)));
     if (select) document.getElementById("tools").hidden = this.series.length === 0;
   }
 
@@ -64,8 +63,18 @@ export class Board {
   begin(number) {
     this.number = number;
     if (this.run.length > 1) this.ghost = this.run;
+    if (this.compared?.run === number) this.ghost = this.compared.history;
     this.run = new History(this.run.columns);
     this.zoomed = null;
+  }
+
+  // A run was made to compare with: it is the faint trace.
+  compare({ run, columns, rows }) {
+    const history = new History(columns);
+    for (const row of rows) history.push(row);
+    this.compared = { run, history };
+    if (run === this.number) this.ghost = history;
+    this.refresh();
   }
 
   clear() {
@@ -74,6 +83,15 @@ export class Board {
     this.ghost = null;
     for (const plot of this.series) plot.span = null;
     for (const plot of this.pictured) plot.clear();
+    this.unzoom();
+  }
+
+  // [s]; 0 for all.
+  setWindow(seconds) {
+    this.window = seconds;
+    const menu = this.windowMenu;
+    if (menu && ![...menu.options].some(({ value }) => Number(value) === seconds)) menu.add(new Option(`${seconds} s`, seconds));
+    if (menu) menu.value = seconds;
     this.unzoom();
   }
 
@@ -112,11 +130,39 @@ export class Board {
     for (const plot of this.plots) plot.rebuild?.();
   }
 
-  // Shows a reader where to look: the plot of this title; none for "".
-  watch(title) {
-    const wanted = this.plots.filter((plot) => plot.plot.title === title);
+  // Shows a reader where to look: the plots of these titles, and the read-out of this label.
+  watch(titles, label) {
+    const wanted = titles.map((title) => this.find(title));
     for (const plot of this.plots) plot.section.classList.toggle("watched", wanted.includes(plot));
     this.shelf.watch(wanted);
+    this.readouts.mark(label);
+  }
+
+  find(title) {
+    return this.plots.find(({ plot }) => plot.title === title);
+  }
+
+  // Shows what the reader predicted in the plots of its channel; null for nothing.
+  mark(guess) {
+    this.guess = guess;
+    this.refresh();
+  }
+
+  // A channel of this run up to a time [s].
+  curve(channel, until) {
+    const t = this.run.column("t");
+    const n = t.findLastIndex((time) => time <= until + 1e-6) + 1;
+    return { t: t.subarray(0, n), y: this.run.column(channel)?.subarray(0, n) ?? [] };
+  }
+
+  // A channel's "last", "min", "max" or "peak" value so far, up to a time [s]; null for none.
+  read(channel, of, until) {
+    const now = this.now?.[this.run.columns.indexOf(channel)];
+    const values = [...this.curve(channel, until).y, ...(now === undefined ? [] : [now])].filter(Number.isFinite);
+    if (!values.length) return null;
+    if (of === "last") return values.at(-1);
+    if (of === "peak") return values.reduce((most, v) => Math.max(most, Math.abs(v)), 0);
+    return values.reduce((a, b) => Math[of](a, b));
   }
 
   // The component chosen for plots whose components share this name: an index, or "all".

@@ -15,9 +15,14 @@ export class Readouts {
       line.append(output, " ", element("small", "", unit));
       tile.append(name, line);
       host.append(tile);
-      return { channel, output, whole };
+      return { tile, label, channel, output, whole };
     });
     host.hidden = plots.length === 0;
+  }
+
+  // Marks the one of this label; none for "".
+  mark(wanted) {
+    for (const { tile, label } of this.tiles) tile.classList.toggle("marked", label === wanted);
   }
 
   update(run, now) {

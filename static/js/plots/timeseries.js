@@ -3,6 +3,7 @@
 /* global uPlot */
 import { number } from "../format.js";
 import { card, element } from "./card.js";
+import { drawGuess, guessedValues } from "./guess.js";
 import { colour, SERIES } from "./palette.js";
 import { symbol } from "./symbol.js";
 
@@ -82,6 +83,7 @@ export class TimeSeries {
       series: [{}, ...this.curves.map((curve) => this.series(curve))],
       hooks: {
         drawAxes: [(u) => this.drawAreas(u), (u) => this.drawGhost(u)],
+        draw: [(u) => drawGuess(u, this.guess)],
         setSelect: [(u) => this.zoom(u)],
         setCursor: [() => this.readOut(true)],
       },
@@ -143,6 +145,8 @@ export class TimeSeries {
         if (value > high) high = value;
       }
     }
+    const guessed = guessedValues(this.guess, low, high);
+    [low, high] = [Math.min(low, ...guessed), Math.max(high, ...guessed)];
     if (!(low <= high)) return [-1, 1];
     for (const curve of this.curves.filter((curve) => curve.line.style === "limit")) {
       const limit = this.board.run.latest(curve.column);
@@ -157,6 +161,12 @@ export class TimeSeries {
     const fits = l <= low && h >= high && h - l < 1.6 * (wanted[1] - wanted[0]);
     if (!fits) this.span = wanted;
     return this.span ?? (this.span = wanted);
+  }
+
+  // What the reader predicted of a curve shown here.
+  get guess() {
+    const { guess } = this.board;
+    return guess && this.curves.some(({ column }) => column === guess.channel) ? guess : null;
   }
 
   isArea(line) {

@@ -51,6 +51,7 @@ def test_the_bill_is_known_in_advance(setting: Mapping[str, Value]) -> None:
     assert pole == pytest.approx((164.7, 178.7), abs=0.05)
     near = bill(LqrParams(deviation=0.05), 8.0)
     assert near[1] / near[0] == pytest.approx(1.0022, abs=0.0003)
+    assert EXPERIMENTS.answer("The bill is known in advance") == "279"
 
 
 @EXPERIMENTS.verify("Constant, then not")
@@ -69,6 +70,7 @@ def test_constant_then_not(setting: Mapping[str, Value]) -> None:
     ends, rests = heavy.gains[-1, 0, 1], steady.gain[0, 1]
     assert ends / rests == pytest.approx(2.4, abs=0.05)
     assert (np.abs(hundred.regulator.gains[-1]) < np.abs(steady.gain)).all()
+    assert EXPERIMENTS.answer("Constant, then not") == twice.regulator.constant_gains
 
 
 @EXPERIMENTS.verify("A short horizon does not see the fall")
@@ -86,6 +88,7 @@ def test_a_short_horizon_does_not_see_the_fall(setting: Mapping[str, Value]) -> 
     assert one.regulator.steady is not None
     np.testing.assert_allclose(one.regulator.gains[0], one.regulator.steady.gain, rtol=1e-8)
     assert not states(one, 5.0)[-1].trouble
+    assert EXPERIMENTS.answer("A short horizon does not see the fall") == "It stands, but the cart runs off."
 
 
 @EXPERIMENTS.verify("A place that costs nothing")
@@ -134,6 +137,7 @@ def test_back_from_the_bottom_not_from_half_way(setting: Mapping[str, Value]) ->
     assert swings.max() < 2.4
     balance = np.pi - np.arcsin(4.0 / 4.905)
     assert swings.min() < balance < swings.max()
+    assert EXPERIMENTS.answer("Back from the bottom, not from half way") == "It gets up."
 
 
 @EXPERIMENTS.verify("One answer, two prices")
@@ -147,6 +151,7 @@ def test_one_answer_two_prices(setting: Mapping[str, Value]) -> None:
     assert 1e12 < np.linalg.norm(np.linalg.matrix_power(a, 260)) < 1e13
     for name in ("riccati", "at_once"):
         assert (np.asarray(pole.seconds[name]) > 0.0).all()
+    assert EXPERIMENTS.answer("One answer, two prices") == "to about 4 digits"
 
 
 def test_every_experiment_of_the_article_is_verified() -> None:

@@ -35,6 +35,7 @@ def test_open_loop_drifts(setting: Mapping[str, Value]) -> None:
     assert np.abs(error(path[-1])).max() > 1.0
     exact = final_state(parameters(setting, initial_error=0.0), 1.0)
     assert np.abs(error(exact)).max() < 1e-9
+    assert ARTICLE.answer("Open loop drifts") == "It leaves."
 
 
 @ARTICLE.verify("PD alone sags")
@@ -85,6 +86,7 @@ def test_gravity_compensation_needs_no_integral(setting: Mapping[str, Value]) ->
     settled = LAB.measure(params, rest)["settling_time"]
     assert isinstance(settled, float)
     assert 0.3 < settled < 1.0
+    assert ARTICLE.answer("Gravity compensation needs no integral") == "At the set point."
 
 
 @ARTICLE.verify("An unknown payload brings the sag back")
@@ -107,6 +109,7 @@ def test_a_floating_arm_stays_where_it_stops(setting: Mapping[str, Value]) -> No
     np.testing.assert_allclose(path[-1].q, path[-200].q, atol=2e-3)
     held = final_state(parameters(setting, kp=200.0), 20.0, {100: PUSHED})
     assert np.abs(error(held)).max() < 1e-3
+    assert ARTICLE.answer("Floating") == "It stays where it stops."
 
 
 @ARTICLE.verify("Computed torque makes joints alike")
@@ -118,6 +121,7 @@ def test_computed_torque_makes_every_joint_alike(setting: Mapping[str, Value]) -
         assert np.ptp(error(state)) < 1e-5
     loaded = [np.ptp(error(s)) for s in states(parameters(setting, payload=5.0), 1.5)]
     assert max(loaded) > 0.02
+    assert ARTICLE.answer("Computed torque makes joints alike") == "None: all are alike."
 
 
 @ARTICLE.verify("Explicit Euler without damping")
@@ -137,6 +141,7 @@ def test_explicit_euler_without_damping_gains_energy(setting: Mapping[str, Value
     assert max(np.abs(error(s)).max() for s in swinging[-100:]) > 0.05
     damped = final_state(parameters(setting, kd=0.4), 20.0)
     assert np.abs(error(damped)).max() < 0.1
+    assert ARTICLE.answer("Explicit Euler without damping") == "It swings ever wider."
 
 
 @ARTICLE.verify("A slow controller chatters")
@@ -152,6 +157,7 @@ def test_a_slow_controller_chatters(setting: Mapping[str, Value]) -> None:
     assert "The control period is at fault" in stopped.trouble
     calm = final_state(parameters(setting, kd=5.0), 20.0)
     assert np.abs(error(calm)).max() < 1e-5
+    assert ARTICLE.answer("A slow controller chatters") == "The light wrist."
 
 
 def test_every_experiment_is_verified_here() -> None:

@@ -5,6 +5,7 @@ import pytest
 
 from labs.engine.catalog import find
 from labs.engine.run import World
+from labs.reinforcement_learning.dynamic_programming.side_by_side import ITERATION_METHODS
 from labs.reinforcement_learning.dynamic_programming.tasks import finite_horizon
 from labs.tasks.grid_world.map import GridWorld
 from labs.tasks.grid_world.walk import nominal_path
@@ -53,6 +54,7 @@ def test_with_little_time_one_gets_close_instead_of_around(setting: Setting) -> 
     assert tuple(world.state.follower.walk.at[0]) == (3, 6)
     np.testing.assert_array_equal(world.state.follower.walk.path[:, 0], finite_way(world, 9))
     assert world.state.follower.walk.cost[0] == 9.0
+    assert ARTICLE.answer("Little time left") == "Into the sack."
 
 
 @ARTICLE.verify("What wandering costs")
@@ -66,6 +68,7 @@ def test_the_wanderer_has_the_published_values(setting: Setting) -> None:
     assert world.state.iterates.count[0] > 100
     assert world.state.iterates.count[3] == 4
     assert world.state.iterates.V[3].max() == 3.0
+    assert values.max() == pytest.approx(ARTICLE.answer("What wandering costs"), abs=1e-4)
 
 
 @ARTICLE.verify("A wave from the goal")
@@ -83,6 +86,7 @@ def test_values_spread_a_step_a_sweep(setting: Setting) -> None:
     assert world.state.iterates.count[3] == 19
     bound = world.lab.fields(world.params, world.state)["bound"]
     np.testing.assert_array_equal(bound, 18.0)
+    assert ARTICLE.answer("A wave from the goal") == true_at
 
 
 @ARTICLE.verify("Keep off the edge")
@@ -98,6 +102,7 @@ def test_who_may_slip_keeps_off_the_edge(setting: Setting) -> None:
     assert rows(0.0) == (13, {2})
     assert rows(0.05) == (15, {1})
     assert rows(0.2) == (17, {0})
+    assert ARTICLE.answer("Keep off the edge") == "No: two rows up."
 
 
 def angles(world: World, seconds: float) -> np.ndarray:
@@ -121,6 +126,7 @@ def test_the_table_swings_the_pendulum_up(setting: Setting) -> None:
     np.testing.assert_allclose(millions[1:], [7.4, 2.6, 7.2], atol=0.05)
     ten = solved({**setting, "m": 10}).state.iterates.backups[-1]
     assert ten[2] / 1e6 == pytest.approx(1.9, abs=0.05)
+    assert list(ITERATION_METHODS.values())[1 + int(np.argmin(millions[1:]))] == ARTICLE.answer("Swing up by table")
 
 
 @ARTICLE.verify("Too short-sighted to swing")
@@ -130,6 +136,7 @@ def test_a_small_discount_leaves_it_hanging(setting: Setting) -> None:
     assert setting["gamma"] == 0.5
     counts = [solved({**setting, "gamma": g}).state.iterates.count[3] for g in (0.5, 0.98)]
     assert counts[0] < 0.2 * counts[1]
+    assert ARTICLE.answer("Too short-sighted to swing") == "Never."
 
 
 @ARTICLE.verify("Too coarse a table")
@@ -153,6 +160,7 @@ def test_a_coarse_table_does_not_see_that_it_hangs(setting: Setting) -> None:
     assert broken(21) == pytest.approx(29.6, abs=0.1)
     assert broken(51) == pytest.approx(3.4, abs=0.05)
     assert broken(101) == pytest.approx(0.13, abs=0.05)
+    assert ARTICLE.answer("Too coarse a table") == "It hangs still."
 
 
 @ARTICLE.verify("Six joints, ten values each")

@@ -1,0 +1,184 @@
+// A prediction: the reader commits to a guess, which runs the experiment; then guess and outcome
+// stand together, in the card and in the plot. What was guessed stays in this browser.
+
+import { number } from "./format.js";
+import { distance, Sketch } from "./sketch.js";
+import { recall, store } from "./storage.js";
+
+const READ_TWICE = 2; // what a solver has found may reach the page a moment after its status
+
+export class Prediction {
+  constructor(slug, experiment, card, board, commit) {
+    this.key = `guesses/${slug}`;
+    this.experiment = experiment;
+    this.asked = experiment.predict;
+    this.board = board;
+    this.commit = commit; // starts the experiment
+    this.form = card.querySelector(".predict");
+    this.verdict = card.querySelector(".verdict");
+    const { guess, outcome } = recall(this.key)?.[experiment.title] ?? {};
+    this.guess = this.isGuess(guess) ? guess : null;
+    this.outcome = this.guess === null ? null : (outcome ?? null);
+    this.wire();
+    this.show();
+  }
+
+  wire() {
+    const [button] = this.form.querySelectorAll("button");
+    this.form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      if (this.asked.kind === "number") this.readNumber();
+    });
+    for (const choice of this.form.querySelectorAll("[data-choice]")) {
+      choice.addEventListener("click", () => this.take(Number(choice.dataset.choice)));
+    }
+    if (this.asked.kind === "curve") button.addEventListener("click", () => this.sketch());
+  }
+
+  readNumber() {
+    const field = this.form.querySelector("input");
+    const text = field.value.trim().replace("−", "-").replace(/^(-?\d*),(\d+)$/, "$1.$2");
+    const wrong = this.form.querySelector(".wrong");
+    const value = Number(text);
+    const valid = text !== "" && Number.isFinite(value);
+    wrong.textContent = valid ? "" : "Type a number, such as 2.5 or 1e-3.";
+    wrong.hidden = valid;
+    field.setAttribute("aria-invalid", String(!valid));
+    if (valid) this.take(value);
+    else field.focus();
+  }
+
+  sketch() {
+    const { watch, highlight, window, seconds } = this.experiment;
+    this.putAway();
+    this.board.setWindow(window);
+    this.board.watch(watch, highlight);
+    const plot = this.board.find(this.asked.plot);
+    this.pad = new Sketch(plot.body, this.asked, seconds, (curve) => {
+      this.putAway();
+      if (curve) this.take(curve);
+    });
+    this.form.querySelector("button").after(this.pad.controls);
+    plot.section.scrollIntoView({ block: "nearest" });
+  }
+
+  putAway() {
+    this.pad?.remove();
+    this.pad = null;
+  }
+
+  take(guess) {
+    this.guess = guess;
+    this.outcome = null;
+    this.save();
+    this.commit();
+  }
+
+  // The experiment has been started, with a guess or without.
+  begin() {
+    this.readings = 0;
+    this.outcome = null;
+    if (this.guess !== null) this.board.mark(this.mark());
+    if (this.guess !== null && this.asked.kind === "choice") {
+      this.outcome = this.asked.answer;
+      this.save();
+    }
+    this.show();
+  }
+
+  // How the session stands, since the experiment was started.
+  follow(status) {
+    if (this.guess === null || this.asked.kind === "choice" || this.readings >= READ_TWICE) return;
+    if (!this.isDue(status)) return;
+    const outcome = this.read(status);
+    if (!Number.isFinite(outcome)) return; // not known yet
+    this.readings += 1;
+    this.outcome = outcome;
+    this.save();
+    this.show();
+  }
+
+  isDue({ t, trouble, solver }) {
+    const { run, seconds } = this.experiment;
+    if (trouble) return true;
+    if (solver && !run.hold) return Boolean(solver.done);
+    return t >= seconds - 1e-6;
+  }
+
+  // What is compared with the guess: the outcome; of a curve the distance from it.
+  read({ run, solver }) {
+    const { asked, experiment } = this;
+    if (asked.kind === "number" && asked.answer !== null) return asked.answer;
+    if (this.board.number !== run) return null;
+    const until = solver && !experiment.run.hold ? Infinity : experiment.seconds;
+    if (asked.kind === "curve") return distance(this.guess, this.board.curve(asked.channel, until));
+    return this.board.read(asked.channel, asked.of, until);
+  }
+
+  mark() {
+    const { kind, channel } = this.asked;
+    if (kind === "number") return channel ? { channel, level: this.guess } : null;
+    return kind === "curve" ? { channel, ...this.guess } : null;
+  }
+
+  save() {
+    const all = recall(this.key) ?? {};
+    store(this.key, JSON.stringify({ ...all, [this.experiment.title]: { guess: this.guess, outcome: this.outcome } }));
+  }
+
+  isGuess(guess) {
+    const { kind, choices } = this.asked;
+    if (kind === "choice") return Number.isInteger(guess) && guess >= 0 && guess < choices.length;
+    if (kind === "number") return Number.isFinite(guess);
+    return Array.isArray(guess?.x) && guess.x.length > 1 && guess.x.length === guess.y?.length;
+  }
+
+  show() {
+    const { guess, outcome, asked } = this;
+    const told = outcome !== null;
+    for (const choice of this.form.querySelectorAll("[data-choice]")) {
+      const i = Number(choice.dataset.choice);
+      choice.setAttribute("aria-pressed", String(i === guess));
+      choice.classList.toggle("right", guess !== null && told && i === asked.answer);
+      choice.classList.toggle("wrong", told && i === guess && i !== asked.answer);
+    }
+    const field = this.form.querySelector("input");
+    if (field && guess !== null && document.activeElement !== field && !field.value) field.value = String(guess);
+    this.verdict.hidden = guess === null;
+    if (guess !== null) this.verdict.replaceChildren(...(told ? this.sayOutcome() : this.sayWhen()));
+  }
+
+  sayWhen() {
+    const { run, seconds } = this.experiment;
+    const solved = !run.hold && document.getElementById("solver");
+    return [`${this.sayGuess()} The outcome comes ${solved ? "when the solver is done" : `at t = ${seconds} s`}.`];
+  }
+
+  sayGuess() {
+    return this.asked.kind === "number" ? `Your guess: ${this.withUnit(this.guess)}.` : "Your guess is drawn dashed.";
+  }
+
+  sayOutcome() {
+    const { guess, outcome, asked } = this;
+    if (asked.kind === "choice") {
+      if (guess === outcome) return ["Right."];
+      const right = this.form.querySelector(`[data-choice="${outcome}"]`);
+      return ["Not so. The answer: ", ...[...right.childNodes].map((node) => node.cloneNode(true))];
+    }
+    if (asked.kind === "curve") return [`Your curve is off by ${this.withUnit(outcome)} (root mean square).`];
+    const off = guess - outcome;
+    const part = outcome ? ` (${number(100 * Math.abs(off / outcome), 2)} %)` : "";
+    const how = off === 0 ? "exactly it" : `${this.withUnit(Math.abs(off), 2)} too ${off > 0 ? "high" : "low"}${part}`;
+    return [`Your guess: ${this.withUnit(guess)}. Outcome: `, strong(this.withUnit(outcome)), `: ${how}.`];
+  }
+
+  withUnit(value, digits = 3) {
+    return `${number(value, digits)} ${this.asked.unit}`.trim();
+  }
+}
+
+function strong(text) {
+  const made = document.createElement("strong");
+  made.textContent = text;
+  return made;
+}

@@ -92,7 +92,7 @@ export class Knobs {
   // Marks the knobs an experiment has set, and brings them into view.
   highlight(names) {
     for (const [name, { row }] of this.rows) row.classList.toggle("set", names.includes(name));
-    const set = names.map((name) => this.rows.get(name)?.row).filter(Boolean);
+    const set = [...document.querySelectorAll(".knob.set")];
     for (const row of set) row.closest("details")?.setAttribute("open", "");
     set.at(-1)?.scrollIntoView({ block: "nearest" });
     set[0]?.scrollIntoView({ block: "nearest" });

@@ -16,8 +16,8 @@ FRAMES = """count => new Promise(done => {
   next();
 })"""
 
-WHOLE = """selector => {
-  const found = [...document.querySelectorAll(selector)];
+WHOLE = """([selector, first]) => {
+  const found = [...document.querySelectorAll(selector)].slice(0, first ? 1 : undefined);
   return found.length > 0 && found.every(element => {
     const box = element.getBoundingClientRect();
     if (!box.width || !box.height) return false;
@@ -27,10 +27,25 @@ WHOLE = """selector => {
       if (getComputedStyle(host).overflowY === "visible") continue;
       const frame = host.getBoundingClientRect();
       if (box.top < frame.top - 1 || box.bottom > frame.bottom + 1) return false;
+      if (box.left < frame.left - 1 || box.right > frame.right + 1) return false;
     }
     return true;
   });
 }"""
+
+FILLED = """selector => [...document.querySelectorAll(selector)].every(plot => {
+  const marks = "td, .note p, .chart :is(.curve, .point, .column), .heatmaplayer image";
+  if (plot.querySelector(marks)) return true;
+  const canvas = plot.querySelector("canvas");
+  if (!canvas) return false;
+  // Curves have a hue; axes, their numbers and the grid have hardly any.
+  const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+  for (let i = 0; i < data.length; i += 4) {
+    const [r, g, b, a] = data.subarray(i, i + 4);
+    if (a > 200 && Math.max(r, g, b) - Math.min(r, g, b) > 60) return true;
+  }
+  return false;
+})"""
 
 Message = dict[str, Any]
 
@@ -83,10 +98,15 @@ class LabPage:
         expect(plot).to_be_visible()
         return plot
 
-    def whole(self, selector: str) -> bool:
-        """Whether all that a selector finds is in view, without scrolling, and there is some."""
-        found: bool = self.page.evaluate(WHOLE, selector)
+    def whole(self, selector: str, first: bool = False) -> bool:
+        """Whether all (or the first) that a selector finds is in view, without scrolling, and
+        there is some."""
+        found: bool = self.page.evaluate(WHOLE, [selector, first])
         return found
+
+    def wait_filled(self, selector: str) -> None:
+        """Waits until every plot that a selector finds shows something."""
+        self.page.wait_for_function(FILLED, arg=selector)
 
     def unfold_panel(self) -> None:
         """Opens the scene's own panel, which waits as a strip at its side."""

@@ -12,6 +12,13 @@ from tests.browser.lab_page import LabPage, wait_frames
 
 SHIPPED = [entry for entry in catalog().values() if entry.package.startswith("labs.")]
 
+KNOBS = ".knob.set:not([hidden])"
+FIT = """selector => {
+  const boxes = [...document.querySelectorAll(selector)].map(knob => knob.getBoundingClientRect());
+  return boxes.at(-1).bottom - boxes[0].top < document.getElementById("knobs").clientHeight - 20;
+}"""
+"""Whether the knobs an experiment has set have room in their column, all at once."""
+
 
 @pytest.mark.parametrize("entry", SHIPPED, ids=lambda entry: entry.slug)
 def test_every_experiment_and_a_slider_set_what_they_say(page: Page, entry: Entry) -> None:
@@ -23,8 +30,15 @@ def test_every_experiment_and_a_slider_set_what_they_say(page: Page, entry: Entr
         expect(page.locator(".experiment").nth(number)).to_have_class(re.compile("current"))
         wanted = entry.lab.Params().change(experiment.settings).model_dump()
         assert lab.status()["params"] == wanted, experiment.title
+        expect(page.locator(".plot.watched")).to_have_count(len(experiment.watch))
         if experiment.watch:
             assert lab.whole(".plot.watched"), experiment.title
+            lab.wait_filled(".plot.watched")
+        if experiment.highlight:
+            expect(page.locator(".tile.marked span")).to_have_text(experiment.highlight)
+            assert lab.whole(".tile.marked"), experiment.title
+        if page.locator(KNOBS).count():
+            assert lab.whole(KNOBS, first=not page.evaluate(FIT, KNOBS)), experiment.title
         for part in (".experiment.current .observe", "#view", "#transport"):
             assert lab.whole(part), (experiment.title, part)
         expect(page.locator("#banner")).not_to_contain_text("defect of the lab")

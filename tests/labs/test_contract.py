@@ -22,6 +22,7 @@ from labs.errors import ParameterError
 from labs.lab import Action, Inputs, Snapshot, State
 from labs.params import Choice, Knob, Params, Text, Toggle, Value
 from labs.plots import Bars, Curves, HeatMap, Matrix, Note, Readout, TimeSeries, Trace
+from server.articles import render
 from server.formulas import tex
 from tests.labs.contract import (
     ENTRIES,
@@ -120,6 +121,18 @@ def test_presets_and_experiments_run(entry: Entry, changes: dict[str, Value]) ->
     world = run(entry.slug, changes, seconds=SECONDS)
     assert {name: getattr(world.params, name) for name in changes} == changes
     check(world)
+
+
+@every_lab
+def test_an_experiment_predicts_what_is_measured_and_compares_with_what_runs(entry: Entry) -> None:
+    for experiment in render(entry).experiments:
+        with under(experiment.title):
+            world = World(entry, experiment.settings)
+            channel = getattr(experiment.predict, "channel", "")
+            assert not channel or channel in world.recorder.columns
+            other = World(entry, {**experiment.settings, **experiment.compare})
+            other.advance()
+            assert not other.trouble
 
 
 @every_lab

@@ -88,7 +88,10 @@ def test_a_short_horizon_does_not_see_the_fall(setting: Mapping[str, Value]) -> 
     assert one.regulator.steady is not None
     np.testing.assert_allclose(one.regulator.gains[0], one.regulator.steady.gain, rtol=1e-8)
     assert not states(one, 5.0)[-1].trouble
-    assert EXPERIMENTS.answer("A short horizon does not see the fall") == "It stands, but the cart runs off."
+    assert (
+        EXPERIMENTS.answer("A short horizon does not see the fall")
+        == "It stands, but the cart runs off."
+    )
 
 
 @EXPERIMENTS.verify("A place that costs nothing")

@@ -126,7 +126,9 @@ def test_the_table_swings_the_pendulum_up(setting: Setting) -> None:
     np.testing.assert_allclose(millions[1:], [7.4, 2.6, 7.2], atol=0.05)
     ten = solved({**setting, "m": 10}).state.iterates.backups[-1]
     assert ten[2] / 1e6 == pytest.approx(1.9, abs=0.05)
-    assert list(ITERATION_METHODS.values())[1 + int(np.argmin(millions[1:]))] == ARTICLE.answer("Swing up by table")
+    assert list(ITERATION_METHODS.values())[1 + int(np.argmin(millions[1:]))] == ARTICLE.answer(
+        "Swing up by table"
+    )
 
 
 @ARTICLE.verify("Too short-sighted to swing")

@@ -43,7 +43,8 @@ A prediction is asked for first, in one of three forms:
 
 The outcome is read at the hold; without one when the solver is done, or in a lab without a solver
 when the window is full; or when the run stops in trouble. A `channel` or `readout` counts up to
-then. A choice is answered at once."""
+then. What has an `answer` is told at once; the lab's tests verify it (tests/labs/experiments.py).
+"""
 
 import tomllib
 from collections.abc import Callable, Mapping
@@ -207,7 +208,8 @@ def _compared(params: type[Params], compare: Mapping[str, Value]) -> str:
         symbol = tunable.get("symbol")
         labels = {o["value"]: o["label"] for o in tunable.get("options", [])}
         shown = f"{value:g}" if type(value) in (int, float) else str(labels.get(value, value))
-        unit = f" {tunable['unit']}" if tunable.get("unit") else ""
+        unit = tunable.get("unit", "")
+        unit = f" {unit}" if unit and "," not in unit else ""  # of one system, not of several
         named = tex(symbol) if symbol else escape(tunable["label"])
         parts.append(f"{named} = {escape(shown + unit)}")
     return ", ".join(parts)

@@ -79,16 +79,21 @@ export class Prediction {
     this.readings = 0;
     this.outcome = null;
     if (this.guess !== null) this.board.mark(this.mark());
-    if (this.guess !== null && this.asked.kind === "choice") {
+    if (this.guess !== null && this.isKnown) {
       this.outcome = this.asked.answer;
       this.save();
     }
     this.show();
   }
 
+  // Whether the article knows the outcome, and need not wait for it.
+  get isKnown() {
+    return Number.isFinite(this.asked.answer);
+  }
+
   // How the session stands, since the experiment was started.
   follow(status) {
-    if (this.guess === null || this.asked.kind === "choice" || this.readings >= READ_TWICE) return;
+    if (this.guess === null || this.isKnown || this.readings >= READ_TWICE) return;
     if (!this.isDue(status)) return;
     const outcome = this.read(status);
     if (!Number.isFinite(outcome)) return; // not known yet
@@ -108,7 +113,6 @@ export class Prediction {
   // What is compared with the guess: the outcome; of a curve the distance from it.
   read({ run, solver }) {
     const { asked, experiment } = this;
-    if (asked.kind === "number" && asked.answer !== null) return asked.answer;
     if (this.board.number !== run) return null;
     const until = solver && !experiment.run.hold ? Infinity : experiment.seconds;
     if (asked.kind === "curve") return distance(this.guess, this.board.curve(asked.channel, until));
@@ -116,8 +120,9 @@ export class Prediction {
   }
 
   mark() {
-    const { kind, channel } = this.asked;
-    if (kind === "number") return channel ? { channel, level: this.guess } : null;
+    const { kind, channel, of } = this.asked;
+    const levels = of === "peak" ? [this.guess, -this.guess] : [this.guess]; // of either sign
+    if (kind === "number") return channel ? { channel, levels } : null;
     return kind === "curve" ? { channel, ...this.guess } : null;
   }
 

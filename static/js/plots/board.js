@@ -23,7 +23,7 @@ export class Board {
     this.window = 10;
     this.zoomed = null;
     this.selection = {};
-    this.guess = null; // what the reader predicted: {channel, level} or {channel, x, y}
+    this.guess = null; // what the reader predicted: {channel, levels} or {channel, x, y}
     this.compared = null; // the run an experiment compares with, and beside which run
     this.readouts = new Readouts(lab.plots.filter((p) => p.kind === "Readout"), document.getElementById("tiles"));
     this.plots = lab.plots.filter((p) => p.kind in KINDS).map((p) => new KINDS[p.kind](p, this));

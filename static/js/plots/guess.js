@@ -1,4 +1,4 @@
-// What the reader predicted, in the plot it is about: a level or a curve, dashed.
+// What the reader predicted, in the plot it is about: levels or a curve, dashed.
 
 import { colour } from "./palette.js";
 
@@ -8,7 +8,7 @@ const REACH = 2; // A guess this many times as far off as the curves are tall st
 export function guessedValues(guess, low, high) {
   if (!guess) return [];
   const reach = REACH * Math.max(high - low, 1e-3 * Math.max(Math.abs(low), Math.abs(high)));
-  const values = guess.y ?? [guess.level];
+  const values = guess.y ?? guess.levels;
   return low <= high ? values.filter((v) => v > low - reach && v < high + reach) : values;
 }
 
@@ -16,8 +16,7 @@ export function drawGuess(u, guess) {
   if (!guess) return;
   const { ctx, bbox } = u;
   const { min, max } = u.scales.x;
-  const x = guess.x ?? [min, max];
-  const y = guess.y ?? [guess.level, guess.level];
+  const lines = guess.levels?.map((level) => [[min, level], [max, level]]) ?? [guess.x.map((t, i) => [t, guess.y[i]])];
   const bottom = bbox.top + bbox.height;
   const place = (v) => Math.min(bottom, Math.max(bbox.top, u.valToPos(v, "y", true)));
   ctx.save();
@@ -28,10 +27,12 @@ export function drawGuess(u, guess) {
   ctx.lineWidth = 1.5 * devicePixelRatio;
   ctx.setLineDash([6 * devicePixelRatio, 4 * devicePixelRatio]);
   ctx.beginPath();
-  for (const [i, t] of x.entries()) ctx.lineTo(u.valToPos(t, "x", true), place(y[i]));
+  for (const line of lines) {
+    line.forEach(([t, v], i) => ctx[i ? "lineTo" : "moveTo"](u.valToPos(t, "x", true), place(v)));
+  }
   ctx.stroke();
   const size = 12 * devicePixelRatio;
-  const end = place(y.at(-1));
+  const end = place(lines[0].at(-1)[1]);
   ctx.font = `${size}px system-ui, sans-serif`;
   ctx.textAlign = "right";
   const below = end < bbox.top + 2 * size;

@@ -172,7 +172,7 @@ export class Prediction {
     }
     if (asked.kind === "curve") return [`Your curve is off by ${this.withUnit(outcome)} (root mean square).`];
     const off = guess - outcome;
-    const part = outcome ? ` (${number(100 * Math.abs(off / outcome), 2)} %)` : "";
+    const part = Math.abs(off) < 10 * Math.abs(outcome) ? ` (${number(100 * Math.abs(off / outcome), 2)} %)` : "";
     const how = off === 0 ? "exactly it" : `${this.withUnit(Math.abs(off), 2)} too ${off > 0 ? "high" : "low"}${part}`;
     return [`Your guess: ${this.withUnit(guess)}. Outcome: `, strong(this.withUnit(outcome)), `: ${how}.`];
   }

@@ -180,6 +180,7 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
             "error": float(np.linalg.norm(target - chain.placement.translation))
             if follows
             else 0.0,
+            "tip_speed": float(np.linalg.norm(jacobian[:3] @ rates)),
             "omega": float(np.linalg.norm(jacobian[3:] @ rates)),
             "rpy": float(np.linalg.norm(analytical_jacobian(chain, jacobian)[3:] @ rates)),
             "sigma_min": float(sigma[-1]),

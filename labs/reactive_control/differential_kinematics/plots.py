@@ -41,6 +41,7 @@ PLOTS = (
     Readout("condition", "Condition number", ""),
     Readout("peak", "Fastest joint speed asked", "rad/s"),
     Readout("short", "Target out of reach by", "m"),
+    Readout("tip_speed", "Speed of the end-effector", "m/s"),
     Readout("bias", "Acceleration at constant joint velocities", "m/s²"),
     Note("Reach", "within_reach"),
 )

@@ -118,7 +118,7 @@ class Dynamics(Lab[DynamicsParams, DynamicsState]):
         asked = params.accelerations(model.nv, state.t)
         found = direct_dynamics(model, data, q, v, inverse_dynamics(model, data, q, v, asked))
         again = inverse_dynamics(model, data, q, v, now.acceleration)
-        return {
+        return _apart(params.force, world.tip_jacobian(q) @ now.acceleration) | {
             "q": q,
             "v": v,
             "acceleration": now.acceleration,
@@ -132,6 +132,7 @@ class Dynamics(Lab[DynamicsParams, DynamicsState]):
             "total": kinetic + potential,
             "power": float(applied @ v),
             "drift": state.energy_drift,
+            "first_inertia": float(now.terms.mass[0, 0]),
             "least_inertia": float(np.linalg.eigvalsh(now.terms.mass)[0]),
             "there_and_back": float(np.abs(found - asked).max()),
             "back_and_there": float(np.abs(again - applied).max()),
@@ -161,6 +162,16 @@ class Dynamics(Lab[DynamicsParams, DynamicsState]):
 
 def _plant(params: DynamicsParams) -> Plant:
     return plant_under_gravity(params.robot, params.payload, params.gravity)
+
+
+def _apart(force: np.ndarray, acceleration: np.ndarray) -> dict[str, float | np.ndarray]:
+    """The angle [degrees] between the force on the end-effector and its acceleration J q'', both
+    (3,); none where there is no force or no acceleration."""
+    sizes = float(np.linalg.norm(force) * np.linalg.norm(acceleration))
+    if sizes < 1e-9:
+        return {}
+    cosine = float(force @ acceleration) / sizes
+    return {"apart": float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))}
 
 
 def _stopped(state: DynamicsState) -> DynamicsState:

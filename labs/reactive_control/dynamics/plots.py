@@ -36,6 +36,8 @@ PLOTS = (
     TimeSeries("Energy", "J", Line("kinetic", "T"), Line("potential", "U"), Line("total", "T + U")),
     TimeSeries("Acceleration", "rad/s²", Line("acceleration", r"\ddot q"), select="joint"),
     TimeSeries("Velocity", "rad/s", Line("v", r"\dot q"), select="joint"),
+    Readout("first_inertia", "Inertia about the first axis, M₁₁", "kg·m²"),
+    Readout("apart", "Force and acceleration apart by", "°"),
     Readout("there_and_back", "Inverse, then direct", "rad/s²"),
     Readout("back_and_there", "Direct, then inverse", "N·m"),
     Readout("residual", "Left − right side", "N·m"),

@@ -44,6 +44,8 @@ def test_only_the_horizontal_part_of_the_lever_counts(setting: Mapping[str, Valu
     ]
     assert lengths[0] == pytest.approx(2 * speed, rel=1e-12)
     assert abs(lengths[1] - 2 * speed) > 0.05
+    tip_speed = LAB.measure(parameters(setting), start(parameters(setting)))["tip_speed"]
+    assert tip_speed == pytest.approx(speed, rel=1e-12)
 
 
 @ARTICLE.verify("A joint that slides")
@@ -54,6 +56,7 @@ def test_the_column_of_a_slide_never_changes(setting: Mapping[str, Value]) -> No
         after = fields(setting, **changes)["geometric"]
         np.testing.assert_array_equal(after[:, 2], [0, 0, 1, 0, 0, 0])
         assert np.any(after != before["geometric"]) == ("lift" not in changes)
+    assert ARTICLE.answer("A joint that slides") == "It is the same in every posture."
 
 
 @ARTICLE.verify("A calm turn, racing angles")
@@ -83,6 +86,7 @@ def test_about_one_axis_they_agree(setting: Mapping[str, Value]) -> None:
         np.testing.assert_allclose(found["difference"], 0.0, atol=1e-14)
         assert found["twist"][5, 0] == pytest.approx(0.3 - 0.5 + 0.8, rel=1e-12)
     assert np.abs(fields({})["difference"]).max() > 0.9
+    assert ARTICLE.answer("When the two agree") == "Zero."
 
 
 @ARTICLE.verify("Fast or strong")
@@ -103,6 +107,7 @@ def test_what_is_slow_is_strong(setting: Mapping[str, Value]) -> None:
     for name in ("velocities", "forces"):
         thinness = [np.linalg.cond(which.axes[name]) for which in (drawn, bent)]
         assert thinness[1] < 0.75 * thinness[0]
+    assert ARTICLE.answer("Fast or strong") == "Along the arm, both."
 
 
 @ARTICLE.verify("The base does not matter")
@@ -115,6 +120,7 @@ def test_turning_the_base_turns_all_columns(setting: Mapping[str, Value]) -> Non
         expected = turn @ home["geometric"][rows]
         np.testing.assert_allclose(turned["geometric"][rows], expected, atol=1e-14)
     assert abs(sigma_min(setting, q3=-1.0) - 0.298) > 0.05
+    assert ARTICLE.answer("The base does not matter") == "Neither."
 
 
 @ARTICLE.verify("Out of reach with the pseudo-inverse")

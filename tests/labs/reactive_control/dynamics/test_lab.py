@@ -74,6 +74,7 @@ def test_there_and_back(setting: Mapping[str, Value]) -> None:
         np.testing.assert_allclose(run["acceleration"][k], asked, atol=1e-12)
     assert np.abs(run["gravity"][:, 1]).min() > np.abs(run["inertia"][:, 1]).max()
     np.testing.assert_allclose(run["gravity"][:, 0], 0.0, atol=1e-9)
+    assert ARTICLE.answer("There and back") == "About $10^{-14}$ away."
 
 
 @ARTICLE.verify("Push the elbow, move the shoulder")
@@ -84,6 +85,7 @@ def test_pushing_the_elbow_moves_the_shoulder(setting: Mapping[str, Value]) -> N
     assert abs(row["mass"][0, 1]) > 0.1
     straight = at_start(setting, q1=-0.9, q2=-0.6)
     assert straight["acceleration"][0] == pytest.approx(-8.5, abs=0.05)
+    assert ARTICLE.answer("Push the elbow, move the shoulder") == "It swings the other way."
 
 
 @ARTICLE.verify("The longer, the heavier")
@@ -94,6 +96,7 @@ def test_the_longer_the_heavier(setting: Mapping[str, Value]) -> None:
     for row in (long, bent):
         assert row["mass"][5, 5] == pytest.approx(0.078, abs=5e-4)
     assert at_start(setting, payload=5.0)["mass"][0, 0] == pytest.approx(8.77, abs=0.005)
+    assert long["first_inertia"] == long["mass"][0, 0]
 
 
 @ARTICLE.verify("A force does not say where to")
@@ -110,6 +113,9 @@ def test_a_force_does_not_say_where_to(setting: Mapping[str, Value]) -> None:
     along_y, less = sets_out(fx=0.0, fy=15.0)
     assert less == pytest.approx(4, abs=0.5)
     assert np.linalg.norm(along_y) > 2 * np.linalg.norm(along_x)
+    assert at_start(setting)["apart"] == pytest.approx(off, rel=1e-12)
+    held = rows(with_(setting), ARTICLE.blocks["A force does not say where to"]["hold"])
+    assert held["apart"][-1] == pytest.approx(14, abs=0.5), "what is read there"
 
 
 @ARTICLE.verify("No torque, no gravity, no rest")
@@ -123,6 +129,7 @@ def test_no_torque_no_gravity_no_rest(setting: Mapping[str, Value]) -> None:
     assert np.abs(run["coriolis"]).max() > 0.1
     assert run["kinetic"][0] == pytest.approx(3.937, abs=5e-4)
     np.testing.assert_allclose(run["kinetic"], run["kinetic"][0], rtol=1e-10)
+    assert ARTICLE.answer("No torque, no gravity, no rest") == "They change, and the energy stays."
 
 
 @ARTICLE.verify("A free fall keeps its energy")
@@ -135,6 +142,7 @@ def test_a_free_fall_keeps_its_energy(setting: Mapping[str, Value]) -> None:
     assert np.ptp(run["total"]) < 1e-6
     assert np.abs(run["drift"]).max() < 1e-6
     assert 19.0 < run["kinetic"].max() < 20.0
+    assert ARTICLE.answer("A free fall keeps its energy") == "It is a flat line."
 
 
 @ARTICLE.verify("A careless integrator makes energy")

@@ -204,6 +204,7 @@ def test_one_slider(setting: Mapping[str, Value]) -> None:
     entries = fields(parameters(setting))["factor"][factor]
     sine, cosine = np.sin(0.5), np.cos(0.5)
     np.testing.assert_allclose(sorted(entries), [-sine, sine, cosine, cosine], atol=1e-12)
+    assert ARTICLE.answer("One slider, one factor") == 4
 
 
 @ARTICLE.verify("The last joint")
@@ -215,6 +216,7 @@ def test_the_last_joint(setting: Mapping[str, Value]) -> None:
     row = fields(parameters(setting))["dependence"][-1]
     assert row[-1] == pytest.approx(np.sqrt(2.0), rel=1e-8)
     assert row[:-1].min() > np.sqrt(2.0) + 1e-4
+    assert ARTICLE.answer("The last joint") == "$z_6^0$ and $p_6^0$"
 
 
 @ARTICLE.verify("Is it still a rotation?")
@@ -224,6 +226,7 @@ def test_still_a_rotation(setting: Mapping[str, Value]) -> None:
     )
     assert measure["orthogonality"] < 1e-15
     assert measure["determinant"] == pytest.approx(1.0, abs=1e-15)
+    assert ARTICLE.answer("Is it still a rotation?") == "a few times $10^{-16}$"
 
 
 @ARTICLE.verify("Two degrees from the lock")
@@ -278,6 +281,7 @@ def test_through_the_lock(setting: Mapping[str, Value]) -> None:
     assert channels["peak_speed"][-1] * LAB.period < 0.002
     quaternions = np.column_stack([channels[name] for name in ("qw", "qx", "qy", "qz")])
     assert np.abs(np.diff(quaternions, axis=0)).max() < 0.001
+    assert ARTICLE.answer("Through the lock") == "It turns back at 90 degrees."
 
 
 @ARTICLE.verify("An arm at its own lock")
@@ -296,6 +300,7 @@ def test_an_arm_at_its_lock(setting: Mapping[str, Value]) -> None:
         assert steps.argmax() == 2
         assert steps[2] == pytest.approx(np.pi, abs=1e-4)
         assert np.delete(steps, 2).max() < 1e-3
+    assert ARTICLE.answer("An arm at its own lock") == "They jump by $\\pi$."
 
 
 @ARTICLE.verify("Another sequence")
@@ -308,6 +313,7 @@ def test_another_sequence(setting: Mapping[str, Value]) -> None:
     # Its own lock: the z axis vertical.
     upright = matrix_to_euler("zyz", Rotation.from_euler("z", 0.4).as_matrix())
     assert lock_sine("zyz", upright[1]) == 0.0
+    assert ARTICLE.answer("Another sequence") == "No."
 
 
 def test_every_experiment_is_verified() -> None:

@@ -52,6 +52,7 @@ def test_a_load_on_a_bent_arm(setting: Mapping[str, Value]) -> None:
     limit = plant("ur5").arm.torque_limit
     assert limit[[1, 3]] == pytest.approx([150, 28])
     np.testing.assert_array_equal(np.abs(tau) > limit, [False, True, False, True, False, False])
+    assert ARTICLE.answer("Thirty kilograms on a bent arm") == "The first and the last."
 
 
 @ARTICLE.verify("Moving without power")
@@ -74,6 +75,7 @@ def test_a_straight_arm_carries_for_nothing(setting: Mapping[str, Value]) -> Non
     assert row["force"] == 300.0
     np.testing.assert_allclose(row["tau"], 0.0, atol=1e-8)
     assert at(setting, q3=0.3)["tau"][1:3] == pytest.approx([43, 43], abs=0.5)
+    assert ARTICLE.answer("The same load on a straight arm") == "None."
 
 
 @ARTICLE.verify("Across instead of along")
@@ -87,6 +89,7 @@ def test_across_instead_of_along(setting: Mapping[str, Value]) -> None:
     dearest, *_, cheapest = LAB.fields(params, start(params))["per_force"]
     assert (dearest, cheapest) == (pytest.approx(1.04, abs=0.005), pytest.approx(0.0, abs=1e-9))
     assert at(setting)["arm_length"] == pytest.approx(dearest, rel=1e-3)
+    assert ARTICLE.answer("Across instead of along") == "Far more."
 
 
 @ARTICLE.verify("A moment looks the same from everywhere")
@@ -97,6 +100,7 @@ def test_a_moment_is_felt_along_each_axis(setting: Mapping[str, Value]) -> None:
         assert tau[1:4] == pytest.approx([0.0] * 3, abs=1e-9)
     assert at(setting)["tau"][5] == pytest.approx(-25.0, abs=0.01)
     assert abs(at(setting, q2=0.5)["tau"][5] + 25.0) > 1.0
+    assert ARTICLE.answer("A moment looks the same from everywhere") == "25 and −25 N·m"
 
 
 def test_every_experiment_is_verified_here() -> None:

@@ -43,6 +43,7 @@ def test_euler_feeds_the_swing(setting: Mapping[str, Value]) -> None:
     assert 2.0 < time_over_the_top(states, "euler") < 3.0
     assert euler[-1] > 5.0 * upright
     assert np.all((semi > 2.0) & (semi < 2.6))
+    assert EXPERIMENTS.answer("Euler feeds the swing") == "It swings ever wider."
 
 
 @EXPERIMENTS.verify("Half the step")
@@ -57,6 +58,8 @@ def test_half_the_step(setting: Mapping[str, Value]) -> None:
     own = parse_tableau(world.params.tableau)
     assert order(own) == order(TABLEAUS["rk3"]) == 3
     assert not np.array_equal(own.a, TABLEAUS["rk3"].a)
+    factor = errors["rk4"][-2] / errors["rk4"][-1]
+    assert factor == pytest.approx(EXPERIMENTS.answer("Half the step"), abs=0.5)
 
 
 @EXPERIMENTS.verify("Four looks a step, and still cheaper")
@@ -68,6 +71,7 @@ def test_rk4_is_cheaper(setting: Mapping[str, Value]) -> None:
     assert state.costs[euler, -1] == 320
     assert state.global_errors[euler, -1] == pytest.approx(0.03, rel=0.2)
     assert 320 * state.global_errors[euler, -1] / state.global_errors[rk4, 1] > 5e5
+    assert EXPERIMENTS.answer("Four looks a step, and still cheaper") == "No, RK4 by far."
 
 
 @EXPERIMENTS.verify("A wrong digit")
@@ -81,6 +85,7 @@ def test_a_wrong_digit(setting: Mapping[str, Value]) -> None:
     errors = world.state.global_errors[METHOD_NAMES.index("yours")]
     assert np.ptp(errors) < 0.01 * errors[0]
     assert LAB.measure(world.params, world.state)["own_order"] == 0.0
+    assert EXPERIMENTS.answer("A wrong digit") == "To 0."
 
 
 @EXPERIMENTS.verify("Order is no insurance")
@@ -96,6 +101,7 @@ def test_order_is_no_insurance(setting: Mapping[str, Value]) -> None:
     assert 1.0 - rk4[-1] / rk4[0] == pytest.approx(0.07, abs=0.005)
     implicit = energies(world, states, "implicit")
     assert np.abs(implicit / implicit[0] - 1.0).max() < 0.01
+    assert EXPERIMENTS.answer("Order is no insurance") == "Semi-implicit Euler."
 
 
 @EXPERIMENTS.verify("Beyond the limit")
@@ -110,6 +116,7 @@ def test_beyond_the_limit(setting: Mapping[str, Value]) -> None:
     assert np.abs(angles(states[-300:], "rk4")).max() < 1e-3
     assert np.abs(angles(states[-1500:], "implicit")).max() == pytest.approx(0.1, abs=0.002)
     assert np.abs(angles(states[-300:], "semi")).max() > 0.2
+    assert EXPERIMENTS.answer("Beyond the limit") == "RK4 alone."
 
 
 @EXPERIMENTS.verify("Friction rescues Euler")
@@ -126,6 +133,7 @@ def test_friction_rescues_euler(setting: Mapping[str, Value]) -> None:
     assert solved(halved).state.limits[0] == pytest.approx(0.041, abs=5e-4)
     _, states = simulated(20.0, halved)
     assert np.abs(angles(states[-200:], "euler")).max() > 0.5
+    assert EXPERIMENTS.answer("Friction rescues Euler") == "Yes."
 
 
 @EXPERIMENTS.verify("Two stages, order four")
@@ -138,6 +146,7 @@ def test_two_stages_order_four(setting: Mapping[str, Value]) -> None:
     world, states = simulated(10.0, {**setting, "implicit": "implicit-midpoint"})
     midpoint = energies(world, states, "implicit")
     assert np.abs(midpoint / midpoint[0] - 1).max() == pytest.approx(0.02, abs=0.002)
+    assert EXPERIMENTS.answer("Two stages, order four") == "Within 0.3 %."
 
 
 @EXPERIMENTS.verify("Chaos beats every order")
@@ -151,6 +160,7 @@ def test_chaos_beats_every_order(setting: Mapping[str, Value]) -> None:
     assert setting["h"] == 0.01
     assert time_of_departure(0.01) == pytest.approx(3.7, abs=0.2)
     assert time_of_departure(0.005) - time_of_departure(0.01) == pytest.approx(1.0, abs=0.2)
+    assert EXPERIMENTS.answer("Chaos beats every order") == "about 4 s"
 
 
 def test_every_experiment_is_verified_here() -> None:

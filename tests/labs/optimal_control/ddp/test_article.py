@@ -25,6 +25,7 @@ def test_two_iterations_do_most(setting: Settings) -> None:
     np.testing.assert_allclose(ratio[-3:], 1.4, atol=0.01)
     exact = state(solved({**setting, "method": "ddp"})).history
     assert exact.actual[-2] / exact.expected[-2] == pytest.approx(1.0, abs=0.01)
+    assert EXPERIMENTS.answer("Watch it think") == np.flatnonzero(history.cost < 3.0)[0]
 
 
 @verify("Second derivatives")
@@ -49,6 +50,7 @@ def test_a_large_mu_is_slow(setting: Settings) -> None:
     assert (history.actual[:100] / history.expected[:100] > 0.25).all(), "all of them good"
     assert (np.diff(history.mu[:100]) < 0.0).all()
     assert len(state(solved({**setting, "mu_factor": 10.0})).history.alpha) < 40
+    assert EXPERIMENTS.answer("Too much caution") == "Small steps, all of them good."
 
 
 @verify("Cheap control")
@@ -75,6 +77,7 @@ def test_a_weak_motor_swings(setting: Settings) -> None:
     scene = NullScene()
     world.lab.draw(scene, world.params, world.state)
     assert "robot" in scene.names
+    assert EXPERIMENTS.answer("A weak motor") == "By swinging."
 
 
 @verify("Another guess, another minimum")
@@ -87,6 +90,7 @@ def test_the_ur5_stays_wound_up(setting: Settings) -> None:
         assert state(world).history.gradient[-1] < 1e-3
     ends = [state(world).plan.X[-1, :6] for world in (wound, still)]
     assert np.abs(ends[0] - ends[1]).max() > 1.0, "[rad] it is another posture"
+    assert EXPERIMENTS.answer("Another guess, another minimum") == "Yes: it ends in a dearer one."
 
 
 @verify("Warm start")
@@ -100,6 +104,7 @@ def test_a_warm_start_is_shorter(setting: Settings) -> None:
         count = solve(world)
     assert count == 11
     assert state(world).history.cost[-1] == pytest.approx(J, rel=1e-6)
+    assert EXPERIMENTS.answer("Warm start") == count
 
 
 @verify("Right model, wrong plan")
@@ -115,6 +120,7 @@ def test_the_ghost_falls_in_the_end(setting: Settings) -> None:
         mechanism("pendulum").derivatives(np.array([[np.pi, 0.0]]), np.zeros((1, 1)))[1][0]
     ).real.max()
     assert np.exp(growth) == pytest.approx(227, abs=1)
+    assert EXPERIMENTS.answer("Right model, wrong plan") == "It comes up and falls over."
 
 
 @verify("An unknown payload")
@@ -126,6 +132,7 @@ def test_feedback_carries_the_payload(setting: Settings) -> None:
     heavy = readouts({**setting, "payload": 0.5}, 2.5)
     assert heavy["paid"] == pytest.approx(1.5, abs=0.01)
     assert heavy["missed"] < 1e-2
+    assert EXPERIMENTS.answer("An unknown payload") == "The robot with feedback alone."
 
 
 def test_every_experiment_is_verified() -> None:

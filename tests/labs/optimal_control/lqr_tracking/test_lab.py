@@ -81,6 +81,7 @@ def test_the_affine_term_carries_the_arm(setting: Mapping[str, Value]) -> None:
     assert gain[1, 1] == pytest.approx(-300.0, rel=0.1)
     _, cheaper = recorded(9.0, setting, effort_weight=0.1)
     assert cheaper["error"][last].max() < 1e-4
+    assert ARTICLE.answer("The affine term carries the arm") == "The affine term $k_t$."
 
 
 @ARTICLE.verify("A motion of the robot has no defect")
@@ -90,6 +91,10 @@ def test_a_motion_has_no_defect(setting: Mapping[str, Value]) -> None:
     assert 28.0 < np.abs(channels["u"]).max() < 29.0
     assert channels["error"].max() < 1e-3
     assert channels["ghost_error"].max() < 1e-3
+    assert (
+        ARTICLE.answer("A motion of the robot has no defect")
+        == "It comes within 1 mm of the circle."
+    )
 
 
 @ARTICLE.verify("It moves before its reference does")
@@ -111,6 +116,7 @@ def test_it_moves_before_its_reference_does(setting: Mapping[str, Value]) -> Non
     assert now["lap_paid"] == pytest.approx(705, abs=0.5)
     assert now["ghost_lap_paid"] == pytest.approx(4671, abs=0.5)
     assert now["optimum"] == pytest.approx(703, abs=0.5)
+    assert ARTICLE.answer("It moves before its reference does") == "half a second before."
 
 
 @ARTICLE.verify("How far ahead is far enough")
@@ -133,6 +139,7 @@ def test_a_linear_cost_is_another_reference(setting: Mapping[str, Value]) -> Non
     assert full_preview(params_of(world).settings).lap_cost == pytest.approx(-150.0, rel=1e-6)
     _, priced = recorded(12.0, setting, lean=0.0, price=10.0)
     assert 1e-5 < abs(priced["p"][-1]) < 1e-3
+    assert ARTICLE.answer("A linear cost is another reference") == "It stops a little to the left."
 
 
 @ARTICLE.verify("A wind it knows, a wind it does not")
@@ -165,6 +172,8 @@ def test_the_bill_is_as_foretold(setting: Mapping[str, Value]) -> None:
     assert share == pytest.approx(1.0 - 0.007, abs=5e-4)
     _, laden = recorded(9.0, setting, payload=0.1)
     assert laden["lap_cost"][-1] == pytest.approx(10.44, abs=0.01)
+    assert f"{foretold:.4g}" == f"{channels['lap_cost'][-1]:.4g}"
+    assert ARTICLE.answer("The bill is as foretold") == 4
 
 
 def test_every_experiment_is_verified() -> None:

@@ -76,6 +76,7 @@ def test_where_the_weeks_go(setting: Mapping[str, Value]) -> None:
     off = 50 * np.abs(after - far).sum(axis=1)
     assert off[0] < 0.2
     assert 1.0 < off.max() < 1.1
+    assert ARTICLE.answer("Where the weeks go") == "No."
 
 
 @ARTICLE.verify("Round and round")
@@ -89,6 +90,7 @@ def test_round_and_round(setting: Mapping[str, Value]) -> None:
     np.testing.assert_allclose(fields["far"], 0.25)
     assert "multiples of 4 steps" in said(world)
     assert measured(walked({**setting, "pace": 50.0}, 400))["visits_off"] < 0.5
+    assert ARTICLE.answer("Round and round") == "It goes round for ever."
 
 
 @ARTICLE.verify("A little hesitation")
@@ -100,6 +102,7 @@ def test_a_little_hesitation(setting: Mapping[str, Value]) -> None:
     np.testing.assert_allclose(now["far"], [0.294, 0.235, 0.235, 0.235], atol=5e-4)
     assert "Aperiodic" in said(walked(setting, 1))
     assert "Periodic" in said(walked({**setting, "shift": 0.0}, 1))
+    assert ARTICLE.answer("A little hesitation") == "Everything: it settles."
 
 
 @ARTICLE.verify("One-way doors")
@@ -119,6 +122,7 @@ def test_one_way_doors(setting: Mapping[str, Value]) -> None:
     assert (np.abs(found + 1.0) < 1e-9).sum() == 1
     assert fields["far"][1:3].sum() == pytest.approx(0.6)
     assert process_of(world).transient.tolist() == [True, False, False, False, False]
+    assert ARTICLE.answer("One-way doors") == "There are two, and all their mixtures."
 
 
 @ARTICLE.verify("Myopic or far-sighted")
@@ -138,6 +142,7 @@ def test_myopic_or_far_sighted(setting: Mapping[str, Value]) -> None:
     np.testing.assert_allclose(means[0], V(0.0), atol=1e-12)
     assert (GAMMAS[0], GAMMAS[-1]) == (0.0, 1.0)
     np.testing.assert_allclose(means[-1], -0.412, atol=5e-4)
+    assert ARTICLE.answer("Myopic or far-sighted") == "Yes, one near 1."
 
 
 @ARTICLE.verify("No end, no sum")
@@ -157,6 +162,7 @@ def test_no_end_no_sum(setting: Mapping[str, Value]) -> None:
     assert "value" not in measured(world)
     assert np.isnan(field_names(world)["exact"]).all()
     assert len(field_names(world)["error"]) == 0
+    assert ARTICLE.answer("No end, no sum") == "There is no $V$."
 
 
 @ARTICLE.verify("The last week")
@@ -169,6 +175,7 @@ def test_the_last_week(setting: Mapping[str, Value]) -> None:
     assert np.linalg.matrix_rank(np.eye(6) - P) == 5
     assert np.linalg.matrix_rank(np.eye(5) - P[:5, :5]) == 5
     assert "V exists all the same" in said(world)
+    assert ARTICLE.answer("The last week") == "Yes."
 
 
 @ARTICLE.verify("How long will a gambler last?")
@@ -181,6 +188,7 @@ def test_how_long_will_a_gambler_last(setting: Mapping[str, Value]) -> None:
     far = process_of(world).long_run
     assert field_names(world)["far"][states.index("Broke")] == pytest.approx(0.5)
     assert far[states.index("3 coins"), states.index("Broke")] == pytest.approx(0.25)
+    assert V["2 coins"] == pytest.approx(ARTICLE.answer("How long will a gambler last?"))
 
 
 @ARTICLE.verify("Never mend a running machine?")
@@ -191,6 +199,7 @@ def test_never_mend_a_running_machine(setting: Mapping[str, Value]) -> None:
     assert Q.argmin(axis=1).tolist() == [0, 1, 1]
     myopic = field_names(run("markov", {**setting, "gamma": 0.4}, seconds=0.0))["Q"]
     assert myopic.argmin(axis=1).tolist() == [0, 0, 1]
+    assert ARTICLE.answer("Never mend a running machine?") == "Where it is worn or broken."
 
 
 def test_every_experiment_is_verified() -> None:

@@ -77,12 +77,14 @@ def test_on_and_off_policy_part_at_the_cliff(setting: Mapping[str, Value]) -> No
     assert np.median(sarsa) == 17.0
     assert (sarsa > 13.0).all()
     assert paid(world) == pytest.approx([50, 27], abs=3.0)
+    assert EXPERIMENTS.answer("Along the edge or not") == "SARSA, off the edge."
 
 
 @EXPERIMENTS.verify("Look where you know little")
 def test_a_confidence_bound_explores_cheaply(setting: Mapping[str, Value]) -> None:
     assert setting["map"] == MAPS["windy"] + "\n"
     assert paid(world_of(setting)) == pytest.approx([15, 15], abs=0.05)
+    assert EXPERIMENTS.answer("Look where you know little") == 15
     dice = paid(world_of(setting, explorer="epsilon-greedy"))
     assert dice == pytest.approx([17, 21], abs=0.7)
     wide = paid(world_of(setting, bound=10.0))
@@ -96,6 +98,7 @@ def test_optimism_explores(setting: Mapping[str, Value]) -> None:
     pessimists = greedy(world_of(setting, q0=50.0))[0]
     assert (pessimists > 13.0).any()
     assert (pessimists == 13.0).any()
+    assert EXPERIMENTS.answer("Optimism explores") == "All ten find the best way."
 
 
 @EXPERIMENTS.verify("Explore less and less")
@@ -104,6 +107,7 @@ def test_fading_exploration_dares_more(setting: Mapping[str, Value]) -> None:
     assert paid(world)[1] == pytest.approx(14.5, abs=0.7)
     assert paid(world_of(setting, fading=0.0))[1] == pytest.approx(28, abs=1.5)
     assert np.median(greedy(world)[1]) == 15.0
+    assert EXPERIMENTS.answer("Explore less and less") == "Yes."
 
 
 @EXPERIMENTS.verify("A step that shrinks")
@@ -114,6 +118,7 @@ def test_steps_that_shrink_come_closer(setting: Mapping[str, Value]) -> None:
     assert constant == pytest.approx(3.0, abs=0.5)
     mean = world_of(setting, omega=1.0).state.training["off"][0, :, -1].mean()
     assert mean == pytest.approx(9, abs=1.0)
+    assert EXPERIMENTS.answer("A step that shrinks") == "The shrinking step."
 
 
 @EXPERIMENTS.verify("Zero is where it started")
@@ -123,6 +128,7 @@ def test_lambda_zero_is_sarsa(setting: Mapping[str, Value]) -> None:
             assert np.array_equal(values[0], values[1]), name
     apart = world_of(setting, decay=0.5).state.training["q"]
     assert not np.array_equal(apart[0], apart[1])
+    assert EXPERIMENTS.answer("Zero is where it started") == "Not at all."
 
 
 @EXPERIMENTS.verify("News travels")
@@ -131,6 +137,7 @@ def test_a_memory_learns_faster_at_first(setting: Mapping[str, Value]) -> None:
     assert paid(world, slice(0, 25)) == pytest.approx([85, 132], abs=12.0)
     late = paid(world, slice(150, None))
     assert late[0] > late[1], "and pays more later"
+    assert EXPERIMENTS.answer("News travels") == "Yes, in the first episodes."
 
 
 @EXPERIMENTS.verify("Traces pile up")
@@ -142,6 +149,7 @@ def test_accumulating_traces_diverge(setting: Mapping[str, Value]) -> None:
     trained(world)
     assert not world.trouble
     assert world.state.training["episodes"][-1] == 500, "it began anew"
+    assert EXPERIMENTS.answer("Traces pile up") == "They grow beyond all bounds."
 
 
 @EXPERIMENTS.verify("Move the goal")
@@ -162,6 +170,7 @@ def test_a_goal_close_by_is_found_at_once(setting: Mapping[str, Value]) -> None:
             assert (
                 pulled > 2 * paid(world_of({**setting, "map": params_of(moved).map}), slice(20))[0]
             )
+    assert EXPERIMENTS.answer("Move the goal") == "It depends on where it goes."
 
 
 def clicked(world: World, cell: tuple[int, int]) -> World:
@@ -177,7 +186,7 @@ def test_the_pendulum_learns_to_swing_up(setting: Mapping[str, Value]) -> None:
     assert world.lab.measure(world.params, world.state)["optimum"] == pytest.approx(6.75, abs=0.005)
     assert greedy(world)[0] == pytest.approx(np.full(5, 6.754), abs=1e-3)
     training = world.state.training
-    late = training["episodes"] == 600
+    late = training["episodes"] == EXPERIMENTS.answer("Swing up from nothing")
     assert np.median(training["offline"][0][:, late]) < 1.1 * 6.75
     early = training["episodes"] <= 200
     assert np.median(training["offline"][0][:, early]) > 14.0
@@ -202,6 +211,7 @@ def test_the_pupil_surpasses_its_teacher(setting: Mapping[str, Value]) -> None:
     assert total == pytest.approx(14.6, abs=0.05)
     assert greedy(blind)[0] == pytest.approx(np.full(5, total), abs=1e-9)
     assert np.median(greedy(world_of(setting, q0=0.0))) == pytest.approx(17, abs=0.6)
+    assert EXPERIMENTS.answer("Over somebody's shoulder") == "Much better."
 
 
 def test_every_experiment_is_verified() -> None:

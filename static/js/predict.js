@@ -178,7 +178,8 @@ export class Prediction {
   }
 
   withUnit(value, digits = 3) {
-    return `${number(value, digits)} ${this.asked.unit}`.trim();
+    const text = Number.isInteger(value) && Math.abs(value) < 1e6 ? String(value).replace("-", "−") : number(value, digits);
+    return `${text} ${this.asked.unit}`.trim();
   }
 }
 

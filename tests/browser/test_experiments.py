@@ -92,7 +92,7 @@ def test_choices_and_solvers_answer_and_what_is_left_leaves_nothing(page: Page) 
     root = card(page, ROOT)
     root.get_by_role("textbox").fill("4")
     root.get_by_role("button", name="Guess").click()
-    expect(root.get_by_role("status")).to_have_text("Your guess: 4.00. Outcome: 4.00: exactly it.")
+    expect(root.get_by_role("status")).to_have_text("Your guess: 4. Outcome: 4: exactly it.")
     assert lab.told(when=lambda s: s["solver"]["done"])["solver"]["pace"] == 30
     asked = card(page, CHOICE)
     asked.get_by_role("button", name="A sine.").click()

@@ -1,9 +1,11 @@
-"""Articles: a lab's Markdown to HTML with the mathematics as MathML and experiments as cards."""
+"""Articles: a lab's Markdown to HTML, with the mathematics as MathML, drawings (SVG files beside the
+article) and experiments as cards."""
 
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from html import escape
 from typing import Any
 
 from markdown_it import MarkdownIt
@@ -63,6 +65,7 @@ class _Writer:
             ("fence", self._fence),
             ("table_open", self._table_open),
             ("table_close", self._table_close),
+            ("image", self._figure),
         ):
             self.markdown.renderer.rules[rule] = method  # type: ignore[attr-defined]
 
@@ -98,6 +101,16 @@ class _Writer:
         experiment = experiments.read(self.entry, tokens[i].content, self._text)
         self.experiments.append(experiment)
         return experiments.card(experiment, len(self.experiments))
+
+    def _figure(self, tokens: Sequence[Token], i: int, *_: Any) -> str:
+        """A drawing beside the article, `![what it shows](NAME.svg)`. It stands in the page itself,
+        so that it has the page's colours: `currentColor`, `var(--accent)`."""
+        name, shows = str(tokens[i].attrs["src"]), tokens[i].content
+        path = self.entry.folder / name
+        if not re.fullmatch(r"\w+\.svg", name) or not path.is_file():
+            raise ArticleError(f"no drawing NAME.svg beside the article is called {name!r}")
+        drawing = path.read_text(encoding="utf-8")
+        return f'<span class="figure" role="img" aria-label="{escape(shows)}">{drawing}</span>'
 
     def _text(self, markdown: str) -> str:
         """HTML of a text within an experiment."""

@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from labs.engine.catalog import Entry, catalog
+from labs.engine.catalog import Entry, catalog, find
 from server.articles import Article, render, render_text, words
 from server.formulas import ArticleError, tex
 
@@ -73,6 +73,16 @@ def test_tables_can_scroll(entry: Entry) -> None:
     html = write(entry, "| a | b |\n|---|---|\n| 1 | 2 |\n").html
     assert html.startswith('<div class="table"><table>')
     assert "<td>1</td>" in html
+
+
+def test_a_drawing_beside_the_article_stands_in_the_page() -> None:
+    entry = find("td-control")
+    html = render_text(entry, '![two "lines"](policy_iteration.svg)').html
+    assert 'role="img" aria-label="two &quot;lines&quot;"' in html
+    assert "<svg" in html
+    for wrong in ("no.svg", "card.webp", "../td_control/policy_iteration.svg", "http://x/a.svg"):
+        with pytest.raises(ArticleError, match="no drawing"):
+            render_text(entry, f"![]({wrong})")
 
 
 def test_other_fenced_blocks_stay_code(entry: Entry) -> None:

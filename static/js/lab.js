@@ -3,6 +3,7 @@
 import { Experiments } from "./experiments.js";
 import { tidyFrame } from "./frame.js";
 import { wireKeyboard } from "./keyboard.js";
+import { KnobColumn } from "./knob_column.js";
 import { Knobs } from "./knobs.js";
 import { linkOf, readLink, writeLink } from "./link.js";
 import { wireMenus } from "./menus.js";
@@ -23,7 +24,8 @@ const board = new Board(lab);
 const transport = new Transport(send);
 const solver = new SolverRow(send, loadSolution);
 const knobs = new Knobs(lab, (changes) => session.change(changes));
-const experiments = new Experiments(lab, apply, (title) => board.watch(title), (names) => knobs.highlight(names));
+const column = new KnobColumn(lab, knobs);
+const experiments = new Experiments(lab, apply, (title) => board.watch(title), (names) => column.highlight(names));
 let link = location.href;
 
 // A command whose refusal is said at the bottom of the page. Tells whether it was done.
@@ -143,6 +145,7 @@ session.addEventListener("status", ({ detail: status }) => {
   solver.show(status.solver);
   experiments.show(status.params);
   knobs.show(status.params);
+  column.show();
   link = linkOf(lab.params, status.params, status.seed);
   writeLink(link);
   if (status.trouble) {

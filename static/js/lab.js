@@ -12,7 +12,7 @@ import { onViewChange, view, wirePreferences } from "./preferences.js";
 import { Session } from "./session.js";
 import { SolverRow } from "./solver.js";
 import { Stage } from "./stage.js";
-import { wireTips } from "./tips.js";
+import { Symbols } from "./symbols.js";
 import { toast } from "./toast.js";
 import { Transport } from "./transport.js";
 import { noteVisit } from "./visits.js";
@@ -25,6 +25,7 @@ const transport = new Transport(send);
 const solver = new SolverRow(send, loadSolution);
 const knobs = new Knobs(lab, (changes) => session.change(changes));
 const column = new KnobColumn(lab, knobs);
+const symbols = new Symbols(lab, knobs);
 const experiments = new Experiments(lab, apply, (title) => board.watch(title), (names) => column.highlight(names));
 let link = location.href;
 
@@ -146,6 +147,7 @@ session.addEventListener("status", ({ detail: status }) => {
   experiments.show(status.params);
   knobs.show(status.params);
   column.show();
+  symbols.show();
   link = linkOf(lab.params, status.params, status.seed);
   writeLink(link);
   if (status.trouble) {
@@ -193,7 +195,6 @@ document.getElementById("help").addEventListener("click", (event) => {
 session.frame.addEventListener("load", () => tidyFrame(session.frame));
 wirePreferences();
 wireMenus();
-wireTips(lab, (name) => knobs.values[name] ?? lab.params.find((p) => p.name === name).default);
 wireKeyboard(actions);
 noteVisit(lab.slug);
 session.create();

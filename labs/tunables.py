@@ -86,11 +86,13 @@ class Knob(Tunable):
         return self.nearest(self.high * math.expm1(position * math.log(LOG_SPAN)) / (LOG_SPAN - 1))
 
     def nearest(self, value: float) -> float:
-        """The nearest value in range that a hand sets: a multiple of `step` (about a thousandth
-        of the range if it is 0), or three significant digits on a logarithmic scale."""
+        """The nearest value in range that a hand sets: whole steps of `step` from the low end
+        (about a thousandth of the range if it is 0), or three significant digits on a logarithmic
+        scale."""
         if self.scale == "linear":
             grain = self.step or 10.0 ** math.floor(math.log10((self.high - self.low) / 200))
-            value = float(f"{math.floor(value / grain + 0.5) * grain:.12g}")
+            steps = math.floor((value - self.low) / grain + 0.5)
+            value = round(self.low + steps * grain, 10) + 0.0
         else:
             value = float(f"{value:.3g}")
         return min(max(value, self.low), self.high)

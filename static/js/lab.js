@@ -1,7 +1,6 @@
 // The lab page: joins the session with everything that shows it or changes it.
 
 import { Experiments } from "./experiments.js";
-import { tidyFrame } from "./frame.js";
 import { wireKeyboard } from "./keyboard.js";
 import { KnobColumn } from "./knob_column.js";
 import { Knobs } from "./knobs.js";
@@ -192,7 +191,6 @@ document.getElementById("help").addEventListener("click", (event) => {
   if (event.target === event.currentTarget) event.currentTarget.close();
 });
 
-session.frame.addEventListener("load", () => tidyFrame(session.frame));
 wirePreferences();
 wireMenus();
 wireKeyboard(actions);

@@ -102,7 +102,7 @@ def test_a_logarithmic_slider_from_zero_starts_linear_and_ends_logarithmic() -> 
     ("name", "dragged", "value"),
     [
         ("angle", 0.123456, 0.12),
-        ("angle", -0.005, 0.0),
+        ("angle", -0.004, 0.0),
         ("angle", 99.0, 3.0),
         ("angle", -3.001, -3.0),
         ("kp", 123.456, 123.0),

@@ -44,6 +44,7 @@ def _angle(i: int) -> Any:
         "rad",
         f"Joint {i}",
         step=0.01,
+        key=True,
         when={"robot": turns},
         help="Angle from the home posture, cut at the joint's limits.",
     )
@@ -80,7 +81,7 @@ class DifferentialParams(Params):
     q6: float = _angle(6)
     q7: float = _angle(7)
     lift: float = POSTURE.knob(
-        0.0, -0.15, 0.15, "d", "m", "Slide", step=0.001, when={"robot": "scara"}
+        0.0, -0.15, 0.15, "d", "m", "Slide", step=0.001, key=True, when={"robot": "scara"}
     )
     """The sliding joint of the SCARA."""
     dq1: float = _rate(1, 0.5)

@@ -30,8 +30,15 @@ if (framed) {
   addEventListener("pagehide", () => listen.abort()); // another scene may come into this frame
 }
 
+// Presses a control, and leaves the focus where it was: Viser gives it to the panel a frame later.
 function press(selector) {
   const control = document.querySelector(selector);
-  control?.click();
-  return control !== null;
+  if (!control) return false;
+  const focused = parent.document.activeElement;
+  control.click();
+  requestAnimationFrame(() => {
+    document.activeElement?.blur();
+    focused?.focus({ preventScroll: true });
+  });
+  return true;
 }

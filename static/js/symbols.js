@@ -4,7 +4,7 @@
 import { short } from "./format.js";
 import { acts } from "./knob_column.js";
 import { place } from "./menus.js";
-import { store, stored } from "./preferences.js";
+import { store, stored } from "./store.js";
 import { positionOf, valueAt } from "./scales.js";
 
 const LENGTH = 240; // [px] that a drag takes from one end of a track to the other

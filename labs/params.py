@@ -1,197 +1,23 @@
-"""Tunables: declared once, they become a slider, a validated field, a CLI option and a link.
+"""Parameters: declared once, they become sliders, validated fields, CLI options and a link.
 
 A lab's parameters are a frozen pydantic model whose fields are made by a `Group`: `knob` (a number
 on a slider), `choice` (one of a few named values), `toggle` (on or off) or `text`.
 """
 
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Literal, Self
+from dataclasses import replace
+from typing import Any, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
-from pydantic.fields import FieldInfo
+from pydantic import BaseModel, ConfigDict, ValidationError, field_validator
 from pydantic_core import ErrorDetails
 from pydantic_core.core_schema import ValidationInfo
 
 from labs.errors import ParameterError
+from labs.tunables import Choice, Effect, Group, Knob, Text, Toggle, Tunable, Value, When
 
-Effect = Literal["live", "solve", "restart"]
-Scale = Literal["linear", "log"]
-Value = float | str | bool
-
-# A logarithmic slider that reaches zero bends to linear below high / LOG_SPAN.
-LOG_SPAN = 1000.0
-TEXT_LENGTH = 400
-LONGEST_TEXT = 4000
-"""A link holds it: three bytes for a letter in most alphabets, three characters for a byte."""
-
-
-@dataclass(frozen=True)
-class Tunable:
-    """What every tunable has. `effect`: "live" acts from the next step on, "solve" starts the
-    solver again, "restart" runs `Lab.init` again."""
-
-    help: str
-    label: str
-    symbol: str
-    group: str
-    effect: Effect
-
-    @property
-    def kind(self) -> str:
-        return type(self).__name__.lower()
-
-    def describe(self, name: str, default: Value) -> dict[str, Any]:
-        """Everything a page needs to show this tunable, as plain JSON data."""
-        return {"name": name, "kind": self.kind, "default": default, **vars(self)}
-
-
-@dataclass(frozen=True)
-class Knob(Tunable):
-    """A number in [low, high] on a slider. `symbol` is TeX as in the notes."""
-
-    unit: str
-    low: float
-    high: float
-    step: float
-    scale: Scale
-
-    def position(self, value: float) -> float:
-        """Where on the slider, in [0, 1], this value sits.
-
-        Logarithmic with low > 0: value = low (high/low)^s. With low = 0 the scale is
-        value = high (r^s - 1) / (r - 1) with r = LOG_SPAN, which passes through zero."""
-        if self.scale == "linear":
-            return (value - self.low) / (self.high - self.low)
-        if self.low > 0:
-            return math.log(value / self.low) / math.log(self.high / self.low)
-        return math.log1p(value / self.high * (LOG_SPAN - 1)) / math.log(LOG_SPAN)
-
-    def at(self, position: float) -> float:
-        """The value at a slider position in [0, 1]. On a logarithmic scale it has three
-        significant digits; the ends are exact."""
-        if position <= 0.0:
-            return self.low
-        if position >= 1.0:
-            return self.high
-        if self.scale == "linear":
-            return self.low + position * (self.high - self.low)
-        if self.low > 0:
-            value = self.low * (self.high / self.low) ** position
-        else:
-            value = self.high * math.expm1(position * math.log(LOG_SPAN)) / (LOG_SPAN - 1)
-        return min(max(float(f"{value:.3g}"), self.low), self.high)
-
-
-@dataclass(frozen=True)
-class Choice(Tunable):
-    """One of a few values. `options` maps each value to the words shown for it."""
-
-    options: Mapping[Any, str]
-    unit: str
-
-    def describe(self, name: str, default: Value) -> dict[str, Any]:
-        options = [{"value": value, "label": text} for value, text in self.options.items()]
-        return super().describe(name, default) | {"options": options}
-
-
-@dataclass(frozen=True)
-class Toggle(Tunable):
-    """On or off."""
-
-
-@dataclass(frozen=True)
-class Text(Tunable):
-    """A short text, such as the rows of a table. What it must say, the lab's model validates:
-    with a `field_validator` that raises ValueError, its message a sentence that helps."""
-
-    rows: int
-    max_length: int
-    """Characters."""
-
-
-@dataclass(frozen=True)
-class Group:
-    """Tunables that stand together under a heading; each is a field and its docstring, its help:
-
-        WEIGHTS = Group("Weights", effect="solve")
-
-        class LqrParams(Params):
-            r: float = WEIGHTS.knob(0.1, 1e-4, 1e4, "r", "1/N²", "Control", scale="log")
-            \"\"\"R = r I: what force or torque costs.\"\"\"
-
-    A tunable may have another `effect` than its group, and its `help` may be an argument where a
-    docstring cannot say it. Without a label a tunable shows its symbol."""
-
-    name: str = ""
-    effect: Effect = "live"
-
-    def knob(
-        self,
-        default: float,
-        low: float,
-        high: float,
-        symbol: str,
-        unit: str = "",
-        label: str = "",
-        *,
-        step: float = 0.0,
-        scale: Scale = "linear",
-        effect: Effect | None = None,
-        help: str = "",
-    ) -> Any:
-        """A number in [low, high] with a slider. `step` is the slider's grain (0: a thousandth)."""
-        shared = (help, label or symbol, symbol, self.name, effect or self.effect)
-        tunable = Knob(*shared, unit, low, high, step, scale)
-        return _field(default, tunable, ge=low, le=high, allow_inf_nan=False)
-
-    def choice(
-        self,
-        default: Value,
-        options: Mapping[Any, str],
-        label: str,
-        symbol: str = "",
-        unit: str = "",
-        *,
-        effect: Effect | None = None,
-        help: str = "",
-    ) -> Any:
-        """One of a few values; `options` maps each value to the words shown for it."""
-        tunable = Choice(help, label, symbol, self.name, effect or self.effect, options, unit)
-        return _field(default, tunable, json_schema_extra={"enum": list(options)})
-
-    def toggle(
-        self, default: bool, label: str, *, effect: Effect | None = None, help: str = ""
-    ) -> Any:
-        """On or off."""
-        return _field(default, Toggle(help, label, "", self.name, effect or self.effect))
-
-    def text(
-        self,
-        default: str,
-        label: str,
-        symbol: str = "",
-        *,
-        rows: int = 1,
-        max_length: int = TEXT_LENGTH,
-        effect: Effect | None = None,
-        help: str = "",
-    ) -> Any:
-        """A text of at most `max_length` characters (up to LONGEST_TEXT), shown in `rows` lines."""
-        if not 1 <= max_length <= LONGEST_TEXT:
-            raise ValueError(
-                f"max_length = {max_length}: a text holds from 1 to {LONGEST_TEXT} characters"
-            )
-        shared = (help, label, symbol, self.name, effect or self.effect)
-        return _field(default, Text(*shared, rows, max_length), max_length=max_length)
-
-
-def _field(default: Value, tunable: Tunable, **constraints: Any) -> Any:
-    # Without a description here, pydantic takes the field's docstring.
-    field: FieldInfo = Field(default, description=tunable.help or None, **constraints)
-    field.metadata.append(tunable)
-    return field
+__all__ = [
+    "Choice", "Effect", "Group", "Knob", "Params", "Text", "Toggle", "Tunable", "Value", "When",
+]  # fmt: skip
 
 
 class Params(BaseModel):
@@ -222,6 +48,14 @@ class Params(BaseModel):
         silent = [name for name, tunable in cls.tunables.items() if not tunable.help]
         if silent:
             raise TypeError(f"{cls.__name__}: {', '.join(silent)} lacks a docstring, its help")
+        for name, tunable in cls.tunables.items():
+            for choices in tunable.when:
+                for governor, values in choices.items():
+                    if not values or set(values) - _options(cls.tunables.get(governor)):
+                        raise TypeError(
+                            f"{cls.__name__}: {name} acts when {governor} is one of {values}, but "
+                            "these are no options of a choice or a toggle"
+                        )
 
     @field_validator("*")
     @classmethod
@@ -243,6 +77,21 @@ class Params(BaseModel):
             return type(self).model_validate(self.model_dump() | dict(changes))
         except ValidationError as error:
             raise ParameterError("; ".join(map(self._error_message, error.errors()))) from None
+
+    def acts(self, name: str) -> bool:
+        """Whether this parameter changes anything under the present choices."""
+        when = self.tunables[name].when
+        return not when or any(
+            all(getattr(self, governor) in values for governor, values in choices.items())
+            for choices in when
+        )
+
+    @classmethod
+    def nearest(cls, name: str, value: float) -> float:
+        """What a handle dragged to `value` makes of a knob: in its range, on its slider's grain."""
+        knob = cls.tunables[name]
+        assert isinstance(knob, Knob)
+        return knob.nearest(value)
 
     def changed_from(self, other: Self) -> dict[str, Value]:
         """The values of these parameters that `other` does not share."""
@@ -274,6 +123,13 @@ class Params(BaseModel):
             why = error["msg"].removeprefix("Value error, ")
             return f"{name}: {why}"
         return f"{shown}: {name} takes true or false"
+
+
+def _options(tunable: Tunable | None) -> set[Any]:
+    """What others may depend on."""
+    if isinstance(tunable, Choice):
+        return set(tunable.options)
+    return {True, False} if isinstance(tunable, Toggle) else set()
 
 
 def _from_text(text: str, tunable: Tunable | None) -> object:

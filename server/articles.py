@@ -118,7 +118,8 @@ class _Writer:
 
 
 class _Symbols:
-    """Marks the symbols that have a slider, so that the page can name them where they stand."""
+    """Marks the symbols that have a slider, so that the page can show and change them where
+    they stand."""
 
     def __init__(self, params: type[Params]) -> None:
         named = {name: t for name, t in params.tunables.items() if t.symbol}
@@ -131,7 +132,8 @@ class _Symbols:
         name = self.names.get(source.strip())
         if name is None:
             return self.mark(tex(source))
-        return f'<a class="symbol" href="#param-{name}" data-param="{name}">{tex(source)}</a>'
+        shown = tex(source)
+        return f'<span class="symbol" role="button" tabindex="0" data-param="{name}">{shown}</span>'
 
     def mark(self, formula: str) -> str:
         for part, name in self.parts.items():

@@ -158,11 +158,14 @@ def _with_mathml(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _groups(params: type[Params]) -> list[tuple[str, list[dict[str, Any]]]]:
-    """The tunables by group, both in the order of declaration."""
-    groups: dict[str, list[dict[str, Any]]] = {}
+    """The tunables by heading, in the order of declaration: on top, without one, those that matter
+    first. Each tells whether it acts at first."""
+    groups: dict[str, list[dict[str, Any]]] = {"": []}
     for tunable in params.describe():
-        groups.setdefault(tunable["group"], []).append(_with_mathml(tunable))
-    return list(groups.items())
+        heading = "" if tunable["key"] else tunable["group"] or "Parameters"
+        acts = params().acts(tunable["name"])
+        groups.setdefault(heading, []).append(_with_mathml(tunable) | {"acts": acts})
+    return [(heading, tunables) for heading, tunables in groups.items() if tunables]
 
 
 def _chapters() -> list[tuple[str, str, list[Entry]]]:

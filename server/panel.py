@@ -1,10 +1,11 @@
-"""The sliders: Viser's panel, generated from a lab's parameters.
+"""The scene's own panel, made by Viser: the knobs that matter first, and the actions.
 
-A logarithmic knob is two rows: a number with its true value, and a slider over its logarithm."""
+It has sliders and menus only: what a person types into a field of Viser's is cut to the decimals
+of its first value, or sent key by key. A slider goes over its knob's track, from 0 to 1; the value
+is said in its label."""
 
 import math
 from collections.abc import Callable
-from itertools import groupby
 from typing import Any
 
 import viser
@@ -23,97 +24,66 @@ class Panel:
 
     def __init__(self, server: viser.ViserServer, mailbox: Mailbox, world: World) -> None:
         self._gui, self._mailbox = server.gui, mailbox
-        self._show: dict[str, Show] = {}
+        self._controls: dict[str, tuple[Any, Show]] = {}
         self._shown: dict[str, Value] = {}
         server.gui.set_panel_label(world.lab.title)
-        values = world.params.model_dump()
-        groups = groupby(world.params.tunables.items(), key=lambda item: item[1].group)
-        for group, members in groups:
-            with self._gui.add_folder(group or "Parameters", expand_by_default=True):
-                for name, tunable in members:
-                    self._show[name] = self._add(name, tunable, values[name])
-                for action in world.lab.actions:
-                    if group and action.group == group:
-                        self._button(action)
+        for name, tunable in world.params.tunables.items():
+            if tunable.key and not isinstance(tunable, Text):
+                self._controls[name] = self._add(name, tunable, getattr(world.params, name))
         for action in world.lab.actions:
-            if not action.group:
-                self._button(action)
-        self._shown = values
+            self._button(action)
+        self.show(world.params)
 
     def show(self, params: Params) -> None:
-        """Moves every control whose parameter differs from what is shown."""
-        values = params.model_dump()
-        for name, value in values.items():
-            if self._shown.get(name) != value:
-                self._show[name](value)
-        self._shown = values
+        """Moves every control whose parameter differs from what is shown; hides those that do not
+        act."""
+        for name, (control, show) in self._controls.items():
+            control.visible = params.acts(name)
+            if self._shown.get(name) != (value := getattr(params, name)):
+                show(value)
+                self._shown[name] = value
 
-    def _add(self, name: str, tunable: Tunable, value: Value) -> Show:
+    def _add(self, name: str, tunable: Tunable, value: Value) -> tuple[Any, Show]:
         match tunable:
-            case Knob(scale="log"):
-                return self._logarithmic(name, tunable, float(value))
             case Knob():
-                return self._linear(name, tunable, float(value))
+                return self._slider(name, tunable, float(value))
             case Choice():
-                return self._choice(name, tunable, value)
-            case Text():
-                field = self._gui.add_text(
-                    tunable.label, str(value), multiline=tunable.rows > 1, hint=tunable.help
-                )
-                return self._wire(field, name)
+                return self._menu(name, tunable, value)
             case _:
                 box = self._gui.add_checkbox(tunable.label, bool(value), hint=tunable.help)
                 return self._wire(box, name)
 
-    def _linear(self, name: str, knob: Knob, value: float) -> Show:
-        grain = knob.step or 10.0 ** math.floor(math.log10((knob.high - knob.low) / 200))
-        slider = self._gui.add_slider(
-            _label(knob), knob.low, knob.high, grain, value, hint=_hint(knob)
-        )
-        return self._wire(slider, name)
-
-    def _logarithmic(self, name: str, knob: Knob, value: float) -> Show:
-        number: Any = self._gui.add_number(
-            knob.label, value, min=knob.low, max=knob.high, step=None, hint=_hint(knob)
-        )
+    def _slider(self, name: str, knob: Knob, value: float) -> tuple[Any, Show]:
         slider: Any = self._gui.add_slider(
-            knob.unit or "log",
+            _caption(knob, value),
             0.0,
             1.0,
             1 / TICKS,
             _tick(knob, value),
-            marks=tuple((_tick(knob, mark), f"{mark:g}") for mark in _decades(knob)),
-            hint=_hint(knob),
+            marks=tuple((_tick(knob, mark), f"{mark:g}") for mark in _marks(knob)),
+            hint=knob.help,
         )
-
-        @number.on_update  # type: ignore[untyped-decorator]
-        async def _(event: Any) -> None:
-            if event.client_id is not None:
-                self._shown.pop(name, None)
-                self._send(name, float(number.value))
-
-        @slider.on_update  # type: ignore[untyped-decorator]
-        async def _(event: Any) -> None:
-            if event.client_id is not None:
-                self._shown.pop(name, None)
-                self._send(name, knob.at(slider.value))
+        self._wire(slider, name, read=knob.at)
 
         def show(value: Value) -> None:
-            number.value = float(value)
-            # A slider already within a tick is left alone: the hand may still be on it.
-            if abs(slider.value - knob.position(float(value))) > 1.5 / TICKS:
+            slider.label = _caption(knob, float(value))
+            # One that is where it leads already is left alone: the hand may still be on it.
+            if knob.at(slider.value) != value:
                 slider.value = _tick(knob, float(value))
 
-        return show
+        return slider, show
 
-    def _choice(self, name: str, choice: Choice, value: Value) -> Show:
+    def _menu(self, name: str, choice: Choice, value: Value) -> tuple[Any, Show]:
         labels = [str(text) for text in choice.options.values()]
         values = list(choice.options)
-        box = self._gui.add_dropdown(
-            _label(choice), labels, initial_value=labels[values.index(value)], hint=choice.help
+        menu = self._gui.add_dropdown(
+            f"{choice.label} [{choice.unit}]" if choice.unit else choice.label,
+            labels,
+            initial_value=labels[values.index(value)],
+            hint=choice.help,
         )
         return self._wire(
-            box,
+            menu,
             name,
             read=lambda label: values[labels.index(label)],
             write=lambda v: labels[values.index(v)],
@@ -125,18 +95,18 @@ class Panel:
         name: str,
         read: Callable[[Any], Value] = lambda value: value,
         write: Callable[[Any], Any] = lambda value: value,
-    ) -> Show:
+    ) -> tuple[Any, Show]:
         # Asynchronous callbacks run in order on Viser's event loop; plain ones do not.
         @control.on_update  # type: ignore[untyped-decorator]
         async def _(event: Any) -> None:
             if event.client_id is not None:
-                self._shown[name] = read(control.value)
-                self._send(name, read(control.value))
+                self._shown.pop(name, None)
+                self._mailbox.put("params", changes={name: read(control.value)})
 
         def show(value: Value) -> None:
             control.value = write(value)
 
-        return show
+        return control, show
 
     def _button(self, action: Action) -> None:
         button = self._gui.add_button(action.label, hint=action.help)
@@ -145,27 +115,21 @@ class Panel:
         async def _(_: Any) -> None:
             self._mailbox.put("press", action=action.name)
 
-    def _send(self, name: str, value: Value) -> None:
-        self._mailbox.put("params", changes={name: value})
 
-
-def _label(tunable: Knob | Choice) -> str:
-    return f"{tunable.label} [{tunable.unit}]" if tunable.unit else tunable.label
-
-
-def _hint(knob: Knob) -> str:
-    unit = f" {knob.unit}" if knob.unit else ""
-    return f"{knob.help} From {knob.low:g} to {knob.high:g}{unit}."
+def _caption(knob: Knob, value: float) -> str:
+    """What is set, with its name and unit."""
+    return f"{knob.label} = {value:.6g} {knob.unit}".rstrip()
 
 
 def _tick(knob: Knob, value: float) -> float:
     return round(knob.position(value) * TICKS) / TICKS
 
 
-def _decades(knob: Knob) -> list[float]:
-    """The ends, and the powers of ten between them that leave room for their digits; where there
-    are none, the middle."""
+def _marks(knob: Knob) -> list[float]:
+    """The ends; on a logarithmic track also the powers of ten between them that leave room for
+    their digits."""
+    if knob.scale == "linear":
+        return [knob.low, knob.high]
     top = math.floor(math.log10(knob.high) - 0.3)
-    marks = [10.0**k for k in range(top, top - 12, -1)]
-    inner = [m for m in marks if m > knob.low and 0.15 < knob.position(m) < 0.85]
-    return [knob.low, *(inner or [knob.at(0.5)]), knob.high]
+    inner = [m for m in (10.0**k for k in range(top, top - 12, -1)) if m > knob.low]
+    return [knob.low, *(m for m in inner if 0.15 < knob.position(m) < 0.85), knob.high]

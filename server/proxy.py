@@ -24,13 +24,17 @@ router = APIRouter(include_in_schema=False)
 GONE, TRY_AGAIN = 4404, 1013
 CLOSE_SECONDS = 0.5
 """A worker, which may be busy or gone, is not waited for longer: nobody is at that end."""
-STYLE = b'<link rel="stylesheet" href="/static/css/scene.css">'
+OURS = (
+    b'<link rel="stylesheet" href="/static/css/scene.css">'
+    b'<script type="module" src="/static/js/scene.js"></script>'
+)
+"""Put into its head."""
 SCRIPT_END = b"</script>"
 
 
 @cache
 def viser_page() -> tuple[bytes, bytes]:
-    """Viser's client, one HTML file, with our style: plain, and compressed.
+    """Viser's client, one HTML file, with our style and script: plain, and compressed.
 
     Its script stands in the head and asks for `<div id="root">` once the page is parsed, or the
     load was broken off: a frame that is sent elsewhere while it loads would run it without a body
@@ -41,7 +45,7 @@ def viser_page() -> tuple[bytes, bytes]:
     page = (Path(spec.origin).parent / "client" / "build" / "index.html").read_bytes()
     start, end = page.index(b"<script"), page.index(SCRIPT_END) + len(SCRIPT_END)
     script, page = page[start:end], page[:start] + page[end:]
-    page = page.replace(b"</head>", STYLE + b"</head>", 1)
+    page = page.replace(b"</head>", OURS + b"</head>", 1)
     page = page.replace(b"</body>", script + b"</body>", 1)
     return page, gzip.compress(page)
 

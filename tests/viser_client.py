@@ -45,7 +45,8 @@ def message(kind: str, **fields: Any) -> bytes:
 
 
 class SceneClient:
-    """`with SceneClient(session) as scene: scene.set("ω [rad/s]", 3.0)`."""
+    """`with SceneClient(session) as scene: scene.set("ω", 0.5)`: controls go by their labels, up to
+    the value that a slider's says."""
 
     def __init__(self, session: Opened) -> None:
         address = session.server.address.replace("http", "ws") + session.info["scene"].rstrip("/")
@@ -57,6 +58,7 @@ class SceneClient:
             origin=session.server.address,  # type: ignore[arg-type]
         )
         self.controls: dict[str, str] = {}  # uuid by label
+        self.labels: dict[str, str] = {}  # what they say, by uuid
         self.values: dict[str, Any] = {}  # what is shown, by uuid
         self.nodes: set[str] = set()
         self._unread: deque[dict[str, Any]] = deque()
@@ -101,7 +103,7 @@ class SceneClient:
         self._unread.clear()
 
     def set(self, label: str, value: Any) -> None:
-        """Moves a control as a hand would."""
+        """Moves a control as a hand would: a slider to a position in [0, 1]."""
         update = {"value": value}
         self.socket.send(message("GuiUpdateMessage", uuid=self.control(label), updates=update))
 
@@ -122,12 +124,20 @@ class SceneClient:
         if self.values[uuid] != value:
             self.read_until(lambda _: self.values[uuid] == value)
 
+    def says(self, label: str, text: str) -> None:
+        """Waits until a control's whole label is `text`. Fails after `PATIENCE`."""
+        uuid = self.control(label)
+        if self.labels[uuid] != text:
+            self.read_until(lambda _: self.labels[uuid] == text)
+
     def _note(self, found: dict[str, Any]) -> None:
         match found:
             case {"uuid": uuid, "props": {"label": str(label)}}:
-                self.controls[label] = uuid
+                self.controls[label.split(" = ")[0]] = uuid
+                self.labels[uuid] = label
                 self.values[uuid] = found.get("value")
-            case {"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}}:
-                self.values[uuid] = value
+            case {"type": "GuiUpdateMessage", "uuid": uuid, "updates": updates}:
+                self.values[uuid] = updates.get("value", self.values.get(uuid))
+                self.labels[uuid] = updates.get("label", self.labels.get(uuid, ""))
             case {"name": str(name), "props": _}:
                 self.nodes.add(name)

@@ -59,7 +59,8 @@ TITLES = {
     "double-pendulum": "Double pendulum",
     "scara": "SCARA",
 }
-"""Known before an arm is loaded, which takes its meshes with it."""
+JOINTS = {"ur5": 6, "panda": 7, "double-pendulum": 2, "scara": 4}
+"""Known before an arm is loaded, which takes its meshes with it; so are the titles."""
 
 
 @cache

@@ -21,6 +21,13 @@ export function plain(value) {
   return String(Number(Number(value).toPrecision(12)));
 }
 
+// Four significant digits and no zeros after them, for the midst of a formula.
+export function short(value) {
+  const size = Math.abs(value);
+  if (size !== 0 && (size >= 1e5 || size < 1e-3)) return number(value);
+  return minus(plain(value.toPrecision(4)));
+}
+
 function minus(text) {
   return text.replace("-", "−");
 }

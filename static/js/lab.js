@@ -1,8 +1,8 @@
 // The lab page: joins the session with everything that shows it or changes it.
 
 import { Experiments } from "./experiments.js";
-import { tidyFrame } from "./frame.js";
 import { wireKeyboard } from "./keyboard.js";
+import { KnobColumn } from "./knob_column.js";
 import { Knobs } from "./knobs.js";
 import { linkOf, readLink, writeLink } from "./link.js";
 import { wireMenus } from "./menus.js";
@@ -11,7 +11,7 @@ import { onViewChange, view, wirePreferences } from "./preferences.js";
 import { Session } from "./session.js";
 import { SolverRow } from "./solver.js";
 import { Stage } from "./stage.js";
-import { wireTips } from "./tips.js";
+import { Symbols } from "./symbols.js";
 import { toast } from "./toast.js";
 import { Transport } from "./transport.js";
 import { noteVisit } from "./visits.js";
@@ -23,7 +23,9 @@ const board = new Board(lab);
 const transport = new Transport(send);
 const solver = new SolverRow(send, loadSolution);
 const knobs = new Knobs(lab, (changes) => session.change(changes));
-const experiments = new Experiments(lab, apply, board, (names) => knobs.highlight(names));
+const column = new KnobColumn(lab, knobs);
+const symbols = new Symbols(lab, knobs);
+const experiments = new Experiments(lab, apply, board, (names) => column.highlight(names));
 let link = location.href;
 
 // A command whose refusal is said at the bottom of the page. Tells whether it was done.
@@ -145,6 +147,8 @@ session.addEventListener("status", ({ detail: status }) => {
   solver.show(status.solver);
   experiments.show(status);
   knobs.show(status.params);
+  column.show();
+  symbols.show();
   link = linkOf(lab.params, status.params, status.seed);
   writeLink(link);
   if (status.trouble) {
@@ -189,10 +193,8 @@ document.getElementById("help").addEventListener("click", (event) => {
   if (event.target === event.currentTarget) event.currentTarget.close();
 });
 
-session.frame.addEventListener("load", () => tidyFrame(session.frame));
 wirePreferences();
 wireMenus();
-wireTips(lab, (name) => knobs.values[name] ?? lab.params.find((p) => p.name === name).default);
 wireKeyboard(actions);
 noteVisit(lab.slug);
 session.create();

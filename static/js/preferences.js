@@ -2,7 +2,7 @@
 
 import { store, stored } from "./store.js";
 
-import { store, stored } from "./storage.js";
+import { store, stored } from "./store.js";
 
 const systemDark = matchMedia("(prefers-color-scheme: dark)");
 const listeners = new Set();

@@ -8,18 +8,23 @@ export function positionOf({ low, high, scale }, value) {
   return Math.log1p((value / high) * (LOG_SPAN - 1)) / Math.log(LOG_SPAN);
 }
 
-// On the knob's grain, or to three digits; the ends are exact.
+// What a hand sets there; the ends are exact.
 export function valueAt(knob, position) {
-  const { low, high, scale, step } = knob;
+  const { low, high, scale } = knob;
   if (position <= 0) return low;
   if (position >= 1) return high;
-  if (scale === "linear") {
-    const value = low + position * (high - low);
-    const grain = step || 10 ** Math.floor(Math.log10((high - low) / 200));
-    return bounded(knob, Number((Math.round(value / grain) * grain).toPrecision(12)));
-  }
-  const value = low > 0 ? low * (high / low) ** position : (high * Math.expm1(position * Math.log(LOG_SPAN))) / (LOG_SPAN - 1);
-  return bounded(knob, Number(value.toPrecision(3)));
+  if (scale === "linear") return nearest(knob, low + position * (high - low));
+  if (low > 0) return nearest(knob, low * (high / low) ** position);
+  return nearest(knob, (high * Math.expm1(position * Math.log(LOG_SPAN))) / (LOG_SPAN - 1));
+}
+
+// In range, whole steps from the low end or three digits.
+function nearest(knob, value) {
+  const { low, high, scale, step } = knob;
+  if (scale === "log") return bounded(knob, Number(value.toPrecision(3)));
+  const grain = step || 10 ** Math.floor(Math.log10((high - low) / 200));
+  const steps = Math.floor((value - low) / grain + 0.5);
+  return bounded(knob, Number((low + steps * grain).toFixed(10)) + 0);
 }
 
 // The value some steps of the keyboard further along the track.

@@ -60,7 +60,7 @@ def _moves(session: Opened, scene: SceneClient) -> list[float]:
                 last = heard.get()[1]
             before = heard.get()[1]
             begin = time.perf_counter()
-            scene.set(label, 0.1 if k % 2 else 0.3)
+            scene.set(label, 0.125 if k % 2 else 0.375)  # of 0.8 rad
             while True:
                 now, last = heard.get(timeout=5)
                 if abs(last - before) > 1e-3:
@@ -83,13 +83,13 @@ def slider_to_scene() -> None:
         server.session("kinematics") as session,
         SceneClient(session) as scene,
     ):
-        label = f"{find('kinematics').lab.Params.tunables['q1'].label} [rad]"
+        label = find("kinematics").lab.Params.tunables["q1"].label
         scene.control(label)
         times = []
         for k in range(TRIES):
             scene.skip(0.05 + 0.001 * (k % 37))  # not in step with the frames
             begin = time.perf_counter()
-            scene.set(label, 0.5 if k % 2 else -0.5)
+            scene.set(label, 0.6 if k % 2 else 0.4)
             scene.read_until(_turns_first_joint)
             times.append(time.perf_counter() - begin)
     print(

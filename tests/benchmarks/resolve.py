@@ -9,7 +9,7 @@ import numpy as np
 from labs.engine.catalog import find
 from labs.engine.run import World
 from labs.optimal_control.ddp.lab import DdpState
-from labs.params import Value
+from labs.params import Knob, Value
 from tests.served import Served
 from tests.viser_client import SceneClient
 
@@ -23,24 +23,25 @@ def weight_to_motion() -> None:
     message with the path of the UR5's new motion: the same, bit for bit, as a world beside it
     finds from the same changes."""
     twin = World(find("ddp"), REACH)
-    label = twin.params.tunables["control"].label
+    knob = twin.params.tunables["control"]
+    assert isinstance(knob, Knob)
     _solve(twin)
     with (
         Served() as server,
         server.session("ddp", params=REACH) as session,
         SceneClient(session) as scene,
     ):
-        scene.control(label)
+        scene.control(knob.label)
         scene.skip(2.0)
         times, iterations = [], []
         for k in range(MOVES):
-            weight = 0.3 + 0.02 * k if k % 2 else 1.5 + 0.02 * k
+            weight = knob.nearest(0.3 + 0.02 * k if k % 2 else 1.5 + 0.02 * k)
             twin.change({"control": weight})
             iterations.append(_solve(twin))
             path = _on_the_wire(twin)
             scene.skip(0.2 + 0.001 * (k % 37))  # not in step with the frames
             begin = time.perf_counter()
-            scene.set(label, weight)
+            scene.set(knob.label, knob.position(weight))
             while path not in scene.socket.recv(20.0):
                 pass
             times.append(time.perf_counter() - begin)

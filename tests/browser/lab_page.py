@@ -115,8 +115,8 @@ class LabPage:
 
     def row(self, label: str) -> Locator:
         """The row of the scene's panel with this label, the panel unfolded: Viser associates no
-        label with its slider."""
-        text = self.scene.get_by_text(label, exact=True)
+        label with its slider. A slider's goes on with its value."""
+        text = self.scene.get_by_text(re.compile(rf"^{re.escape(label)}( =|$)"))
         expect(self.scene.locator("canvas").first).to_be_visible()
         if not text.is_visible():
             self.unfold_panel()

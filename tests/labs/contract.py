@@ -356,6 +356,18 @@ def seen(world: World) -> Any:
     return plain({"measured": lab.measure(params, state), "fields": lab.fields(params, state)})
 
 
+def drawn(world: World) -> Any:
+    """All that is drawn, as something to compare."""
+    calls: list[Any] = []
+
+    class Listing:
+        def __getattr__(self, name: str) -> Any:
+            return lambda *given, **named: calls.append((name, given, named))
+
+    world.lab.draw(Listing(), world.params, world.state)
+    return plain(calls)
+
+
 def moved(entry: Entry, changes: Mapping[str, Value] | None = None, steps: int = 30) -> World:
     """A world after its solver and some steps."""
     world = World(entry, changes, seed=1)

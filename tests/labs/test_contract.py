@@ -33,6 +33,7 @@ from tests.labs.contract import (
     advance,
     begun,
     check,
+    drawn,
     extremes,
     iterate,
     moved,
@@ -98,6 +99,41 @@ def test_every_parameter_is_documented(entry: Entry) -> None:
                 assert isinstance(tunable, Text | Toggle)
     labels = [(t.group, t.label) for t in entry.lab.Params.tunables.values()]
     assert len(labels) == len(set(labels)), "no two sliders of a group look alike"
+
+
+@every_lab
+def test_what_is_said_not_to_act_changes_nothing(entry: Entry) -> None:
+    """At the defaults, and under options of each choice that others depend on, as many as it takes
+    to see all that idles: it has another value, beside a twin where it has its default."""
+    governors = {
+        governor
+        for tunable in entry.lab.Params.tunables.values()
+        for choices in tunable.when
+        for governor in choices
+    }
+    tried = [{}, *({name: value} for name, value in extremes(entry) if name in governors)]
+    known: list[set[str]] = [set()]
+    for changes in tried:
+        params = entry.lab.Params().change(changes)
+        idle = {name: other(entry, name) for name in params.tunables if not params.acts(name)}
+        if set(idle) not in known:
+            known.append(set(idle))
+            with under((changes, idle)):
+                twin, world = (World(entry, {**more, **changes}) for more in ({}, idle))
+                for each in (twin, world):
+                    iterate(each, 3)
+                    advance(each, 5)
+                    each.state = replace(each.state, seconds={})
+                assert seen(world) == seen(twin)
+                assert drawn(world) == drawn(twin)
+
+
+def other(entry: Entry, name: str) -> Value:
+    """Some value that is not the default."""
+    default = getattr(entry.lab.Params(), name)
+    ready = [dict(values)[name] for _, values in settings(entry) if name in values]
+    values = [value for tried, value in extremes(entry) if tried == name]
+    return next((value for value in values + ready if value != default), default)
 
 
 @every_lab

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from labs.errors import ParameterError
-from labs.params import LOG_SPAN, LONGEST_TEXT, Group, Knob, Params, Scale
+from labs.params import Group, Knob, Params, When
+from labs.tunables import LOG_SPAN, LONGEST_TEXT, Scale
 
 KNOBS = Group()
 
@@ -31,7 +32,9 @@ class Sample(Params):
 
 
 def a_knob(low: float, high: float, scale: Scale) -> Knob:
-    return Knob("Help.", "k", "k", "", "live", "", low, high, 0.0, scale)
+    made = KNOBS.knob(low, low, high, "k", scale=scale, help="Help.")
+    (knob,) = (entry for entry in made.metadata if isinstance(entry, Knob))
+    return knob
 
 
 @st.composite
@@ -62,10 +65,11 @@ def test_a_slider_is_monotone_and_stays_in_range(k: Knob, one: float, other: flo
 
 @given(knobs(), st.floats(0.0, 1.0))
 def test_position_inverts_at(k: Knob, position: float) -> None:
-    """As far as rounding to three significant digits allows: half a unit of the third digit."""
+    """As far as the slider's grain allows: half of it, or half a unit of the third digit."""
     value = k.at(position)
     if k.low < value < k.high:
-        shift = 0.0 if k.scale == "linear" else 0.00501 * abs(value)
+        grain = 10.0 ** math.floor(math.log10((k.high - k.low) / 200))
+        shift = 0.501 * grain if k.scale == "linear" else 0.00501 * abs(value)
         slack = 1e-9 * (k.high - k.low)
         exact = a_value(k, position)
         assert abs(value - exact) <= shift + slack
@@ -92,6 +96,80 @@ def test_a_logarithmic_slider_from_zero_starts_linear_and_ends_logarithmic() -> 
     assert k.at(1 / 3) == 9.0
     assert k.at(2 / 3) == 99.0
     assert k.position(0.0) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "dragged", "value"),
+    [
+        ("angle", 0.123456, 0.12),
+        ("angle", -0.004, 0.0),
+        ("angle", 99.0, 3.0),
+        ("angle", -3.001, -3.0),
+        ("kp", 123.456, 123.0),
+        ("kp", -1.0, 0.0),
+        ("decay", 0.0123456, 0.0123),
+        ("decay", 1e-9, 0.001),
+        ("mass", 0.37, 0.35),
+    ],
+)
+def test_a_dragged_value_is_one_that_the_slider_takes(
+    name: str, dragged: float, value: float
+) -> None:
+    assert Governed.nearest(name, dragged) == value
+    assert Governed().change({name: Governed.nearest(name, dragged)})
+
+
+# What acts ------------------------------------------------------------------------------------
+
+
+LOAD = Group("Load", when={"limits": True})
+
+
+class Governed(Sample):
+    mass: float = LOAD.knob(0.2, 0.1, 2.0, "m", "kg", step=0.05)
+    """Mass."""
+    ki: float = LOAD.knob(0.0, 0.0, 1.0, "k_i", key=True, when={"law": "pid"})
+    """Integral gain."""
+    either: float = KNOBS.knob(
+        0.0, 0.0, 1.0, "e", when=({"law": ["pd"]}, {"period": (0.01,), "limits": False})
+    )
+    """Acts in two cases."""
+
+
+@pytest.mark.parametrize(
+    ("changes", "acting"),
+    [
+        ({}, {"mass", "ki"}),
+        ({"law": "pd"}, {"mass", "either"}),
+        ({"limits": False}, set()),
+        ({"limits": False, "period": 0.01}, {"either"}),
+        ({"limits": False, "law": "pd"}, {"either"}),
+    ],
+)
+def test_a_tunable_acts_under_the_choices_it_names(
+    changes: dict[str, object], acting: set[str]
+) -> None:
+    params = Governed().change(changes)
+    assert {name for name in params.tunables if params.acts(name)} == {*Sample.tunables} | acting
+
+
+def test_a_description_says_what_matters_and_when_it_acts() -> None:
+    described = {d["name"]: d for d in json.loads(json.dumps(Governed.describe()))}
+    assert [name for name, d in described.items() if d["key"]] == ["ki"]
+    assert described["kp"]["when"] == []
+    assert described["ki"]["when"] == [{"limits": [True], "law": ["pid"]}]
+    assert described["either"]["when"] == [{"law": ["pd"]}, {"period": [0.01], "limits": [False]}]
+
+
+@pytest.mark.parametrize(
+    "when", [{"law": "pdi"}, {"law": []}, {"kp": 1.0}, {"nothing": True}, {"limits": "pid"}]
+)
+def test_a_condition_names_options_of_a_choice(when: When) -> None:
+    with pytest.raises(TypeError, match=r"Astray: more acts when \w+ is one of"):
+
+        class Astray(Sample):
+            more: float = KNOBS.knob(0.0, 0.0, 1.0, "m", when=when)
+            """More."""
 
 
 # Refusals -------------------------------------------------------------------------------------

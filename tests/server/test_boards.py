@@ -45,18 +45,26 @@ def click(x: float, y: float) -> bytes:
 
 
 def test_a_click_on_a_board_is_an_edit(served: Served) -> None:
-    with served.session("board") as session, SceneClient(session) as scene:
+    with (
+        served.session("board") as session,
+        session.stream() as stream,
+        SceneClient(session) as scene,
+    ):
         rows = session.info["params"]["map"].split("\n")
         assert rows[2][4] == "#"
-        freed = "\n".join([*rows[:2], rows[2][:4] + "." + rows[2][5:], *rows[3:]])
+        freed = [*rows[:2], rows[2][:4] + "." + rows[2][5:], *rows[3:]]
+
+        def becomes(expected: list[str]) -> None:
+            stream.next("status", lambda s: s["params"]["map"] == "\n".join(expected))
+
         scene.wait_for_node("/board")
         scene.socket.send(click(0.05, 0.05))
-        scene.shows("Map", freed)
+        becomes(freed)
         scene.socket.send(click(0.05, 0.05))
-        scene.shows("Map", "\n".join(rows))
+        becomes(rows)
         scene.socket.send(click(0.05, 0.45))  # beside the board
         scene.socket.send(click(-0.35, -0.25))
-        scene.shows("Map", "\n".join([*rows[:5], "#" + rows[5][1:]]))
+        becomes([*rows[:5], "#" + rows[5][1:]])
 
 
 def test_a_click_is_never_lost_among_others() -> None:

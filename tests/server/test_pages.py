@@ -66,6 +66,21 @@ def test_a_lab_page_carries_what_its_scripts_need(client: TestClient, slug: str)
     assert all(p["mathml"].startswith("<math") for p in params if p["symbol"])
 
 
+@pytest.mark.parametrize("slug", SLUGS)
+def test_a_choice_stands_above_what_it_governs(client: TestClient, slug: str) -> None:
+    """Showing and hiding what acts then moves nothing that stays, least of all the choice."""
+    params = catalog()[slug].lab.Params
+    rows = re.findall(r'id="param-(\w+)" (hidden)?', client.get(f"/labs/{slug}").text)
+    order = [name for name, _ in rows]
+    assert sorted(order) == sorted(params.tunables)
+    for name, tunable in params.tunables.items():
+        for choices in tunable.when:
+            assert all(order.index(governor) < order.index(name) for governor in choices), name
+    assert {name for name, hidden in rows if hidden} == {n for n in order if not params().acts(n)}
+    keys = [name for name, tunable in params.tunables.items() if tunable.key]
+    assert order[: len(keys)] == keys, "what matters first is on top"
+
+
 def test_data_cannot_end_its_script_element(client: TestClient) -> None:
     html = client.get(f"/labs/{LAB}").text
     inside = html.split('id="lab-data">')[1].split("</script>")[0]

@@ -16,6 +16,7 @@ from labs.appendix.integration.accuracy import (
 from labs.appendix.integration.params import METHOD_NAMES, IntegrationParams
 from labs.appendix.integration.picture import draw_pendulums, tip_position
 from labs.appendix.integration.plots import PLOTS, error_fields, stability_fields
+from labs.arrays import with_row
 from labs.lab import Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
 from labs.scene import Scene
@@ -135,10 +136,10 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
         for i, name in enumerate(METHOD_NAMES):
             errors, local, costs, limit = errors_and_limit(*params.method(name), params.start)
             studied = {
-                "global_errors": _with_row(studied["global_errors"], i, errors),
-                "local_errors": _with_row(studied["local_errors"], i, local),
-                "costs": _with_row(studied["costs"], i, costs),
-                "limits": _with_row(studied["limits"], i, limit),
+                "global_errors": with_row(studied["global_errors"], i, errors),
+                "local_errors": with_row(studied["local_errors"], i, local),
+                "costs": with_row(studied["costs"], i, costs),
+                "limits": with_row(studied["limits"], i, limit),
             }
             done = "All methods studied." if i == len(METHOD_NAMES) - 1 else ""
             yield Snapshot(i + 1, studied, done, (i + 1) / len(METHOD_NAMES))
@@ -179,10 +180,3 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
         where its tip would be."""
         n = params.rods
         draw_pendulums(scene, state.reference[:n], state.x[:, :n], state.stopped)
-
-
-def _with_row(rows: np.ndarray, i: int, row: np.ndarray | float) -> np.ndarray:
-    """A copy with one row replaced."""
-    new = rows.copy()
-    new[i] = row
-    return new

@@ -33,15 +33,17 @@ STEPPING = Group("Methods", effect="solve")
 class IntegrationParams(Params):
     """What the user can turn."""
 
-    system: str = SYSTEM.choice("pendulum", SYSTEMS, "System")
+    system: str = SYSTEM.choice("pendulum", SYSTEMS, "System", key=True)
     """What every method integrates: one rod of half a metre, or two."""
-    start: float = SYSTEM.knob(1.0, 0.0, 3.1, "q(0)", "rad", "Start angle", step=0.01)
+    start: float = SYSTEM.knob(1.0, 0.0, 3.1, "q(0)", "rad", "Start angle", step=0.01, key=True)
     """Of the first rod from hanging; the second starts in line with it. All start at rest."""
     friction: float = SYSTEM.knob(
-        0.0, 0.0, 5.0, "b", "N·m·s/rad", "Friction", scale="log", effect="solve"
+        0.0, 0.0, 5.0, "b", "N·m·s/rad", "Friction", scale="log", effect="solve", key=True
     )
     """Viscous, at every hinge. It moves the eigenvalues to the left."""
-    h: float = STEPPING.knob(0.04, 0.002, 1.0, "h", "s", "Step", scale="log", effect="live")
+    h: float = STEPPING.knob(
+        0.04, 0.002, 1.0, "h", "s", "Step", scale="log", effect="live", key=True
+    )
     """Of all methods alike. A pendulum stands still between two steps."""
     implicit: str = STEPPING.choice("implicit-midpoint", IMPLICIT_METHODS, "Implicit method")
     """Which one the gray pendulum follows; its stages are found by Newton's method."""

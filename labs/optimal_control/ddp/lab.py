@@ -22,7 +22,7 @@ from labs.optimal_control.ddp.plots import (
     plan_gain_fields,
     portrait_fields,
 )
-from labs.params import Knob, Value
+from labs.params import Value
 from labs.problems.optimal_control import OptimalControlProblem
 from labs.scene import Scene
 from labs.tasks.motion.motions import clip_controls, first_guess, resample, tip_path
@@ -154,15 +154,11 @@ class Ddp(Lab[DdpParams, DdpState]):
     def edit(
         self, params: DdpParams, handle: str, point: tuple[float, float, float]
     ) -> Mapping[str, Value]:
-        """The ball is the UR5's target, to the millimetre."""
+        """The ball is the UR5's target."""
         if handle != "target":
             return {}
-        changes: dict[str, Value] = {}
-        for name, value in zip(("target_x", "target_y", "target_z"), point, strict=True):
-            tunable = params.tunables[name]
-            assert isinstance(tunable, Knob)
-            changes[name] = min(max(round(float(value), 3), tunable.low), tunable.high)
-        return changes
+        names = ("target_x", "target_y", "target_z")
+        return {name: params.nearest(name, x) for name, x in zip(names, point, strict=True)}
 
     # The world's clock ------------------------------------------------------------------------
 

@@ -15,7 +15,10 @@ class DdpParams(MotionParams):
     """What the user can turn."""
 
     method: str = SOLVER.choice(
-        "ilqr", {"ilqr": "iLQR (Gauss-Newton)", "ddp": "DDP (second derivatives)"}, "Method"
+        "ilqr",
+        {"ilqr": "iLQR (Gauss-Newton)", "ddp": "DDP (second derivatives)"},
+        "Method",
+        key=True,
     )
     """Whether the second derivatives of the dynamics enter."""
     start: str = SOLVER.choice(
@@ -36,7 +39,7 @@ class DdpParams(MotionParams):
     """Least part of the expected improvement for which mu shrinks; at least c_1 counts."""
     iterations: float = SOLVER.knob(200.0, 1.0, 300.0, "n_{max}", "", "Most iterations", step=1.0)
     """Before the solver stops short."""
-    payload: float = WORLD.knob(0.0, 0.0, 3.0, "m_{load}", "kg", "Payload", step=0.01)
+    payload: float = WORLD.knob(0.0, 0.0, 3.0, "m_{load}", "kg", "Payload", step=0.01, key=True)
     """A point mass at the tip that the plan does not know of."""
     friction: float = WORLD.knob(0.0, 0.0, 10.0, "b", "N·m·s/rad", "Friction", scale="log")
     """Viscous friction at every joint that the plan does not know of."""

@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from labs.arrays import with_row
 from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.models.plant import Force
 from labs.optimal_control.lqr.comparison import COMPARED_HORIZONS, HORIZON_COUNT, compare
@@ -192,7 +193,7 @@ class Lqr(Lab[LqrParams, LqrState]):
         data |= {name: np.zeros(HORIZON_COUNT) for name in ("differences", "riccati", "at_once")}
         for row in range(rows):
             recovers = params.closed_loop.recovers_in_row(row)
-            data["region"] = _with(data["region"], row, recovers)
+            data["region"] = with_row(data["region"], row, recovers)
             count += 1
             yield Snapshot(count, dict(data), progress=count / last)
         if rows:
@@ -201,9 +202,9 @@ class Lqr(Lab[LqrParams, LqrState]):
             yield Snapshot(count, dict(data), progress=count / last)
         for i, horizon in horizons:
             both = compare(LqrProblem(horizon, p.a, p.b, p.q, p.r, p.q))
-            data["differences"] = _with(data["differences"], i, both.difference)
+            data["differences"] = with_row(data["differences"], i, both.difference)
             for name, took in (("riccati", both.riccati), ("at_once", both.least_squares)):
-                data[name] = _with(data[name], i, min(data[name][i] or np.inf, took))
+                data[name] = with_row(data[name], i, min(data[name][i] or np.inf, took))
             count += 1
             done = _summary(regulator) if count == last else ""
             yield Snapshot(count, dict(data), done, progress=count / last)
@@ -255,13 +256,6 @@ class Lqr(Lab[LqrParams, LqrState]):
     def draw(self, scene: Scene, params: LqrParams, state: LqrState) -> None:
         """The system, a ghost at its rest, and the forces on it."""
         draw_regulated(scene, params, state.x, state.u, state.force)
-
-
-def _with(array: np.ndarray, i: int, value: float | np.ndarray) -> np.ndarray:
-    """A copy of the array with another entry or row i."""
-    changed = array.copy()
-    changed[i] = value
-    return changed
 
 
 def _summary(regulator: Regulator) -> str:

@@ -13,6 +13,9 @@ from labs.optimal_control.lqr.regulator import (
 from labs.params import Group, Params
 from labs.tasks.regulation.linear_systems import LINEAR_SYSTEMS, LinearSystem, linear_system
 
+SLIDING = {"system": ["cart-pole", "mass"]}
+TURNING = {"system": ["cart-pole", "pendulum", "ur5"]}
+OWN_LIMIT = {"system": ["cart-pole", "pendulum", "mass"]}
 PERIODS = {0.01: "10 ms", 0.02: "20 ms", 0.05: "50 ms", 0.1: "100 ms", 0.2: "200 ms"}
 
 SYSTEM = Group("System", effect="restart")
@@ -24,29 +27,40 @@ WORLD = Group("World", effect="solve")
 class LqrParams(Params):
     """What the user can turn."""
 
-    system: str = SYSTEM.choice("cart-pole", LINEAR_SYSTEMS, "System")
+    system: str = SYSTEM.choice("cart-pole", LINEAR_SYSTEMS, "System", key=True)
     """What is to be kept at rest."""
     deviation: float = SYSTEM.knob(
-        0.3, -3.2, 3.2, "\\Delta x_0", "rad, m", "Start off by", step=0.01
+        0.3, -3.2, 3.2, "\\Delta x_0", "rad, m", "Start off by", step=0.01, key=True
     )
     """Of the pole, the pendulum, the mass, or every joint of the UR5, at rest."""
     period: float = SYSTEM.choice(0.02, PERIODS, "Time step", "T", "s", effect="solve")
     """From t to t + 1: the policy looks once in a step and holds its control."""
-    q_slide: float = WEIGHTS.knob(10.0, 0.0, 10_000.0, "q_p", "1/m²", "Position", scale="log")
+    q_slide: float = WEIGHTS.knob(
+        10.0, 0.0, 10_000.0, "q_p", "1/m²", "Position", scale="log", key=True, when=SLIDING
+    )
     """Q's weight of what slides: the cart, the mass."""
-    q_turn: float = WEIGHTS.knob(10.0, 0.0, 10_000.0, "q_\\theta", "1/rad²", "Angle", scale="log")
+    q_turn: float = WEIGHTS.knob(
+        10.0, 0.0, 10_000.0, "q_\\theta", "1/rad²", "Angle", scale="log", key=True, when=TURNING
+    )
     """Q's weight of what turns: the pole, the pendulum, each joint of the UR5."""
     q_slide_rate: float = WEIGHTS.knob(
-        1.0, 0.0, 1000.0, "q_{\\dot p}", "s²/m²", "Velocity", scale="log"
+        1.0, 0.0, 1000.0, "q_{\\dot p}", "s²/m²", "Velocity", scale="log", when=SLIDING
     )
     """Q's weight of the velocity of what slides."""
     q_turn_rate: float = WEIGHTS.knob(
-        1.0, 0.0, 1000.0, "q_{\\dot\\theta}", "s²/rad²", "Angular velocity", scale="log"
+        1.0,
+        0.0,
+        1000.0,
+        "q_{\\dot\\theta}",
+        "s²/rad²",
+        "Angular velocity",
+        scale="log",
+        when=TURNING,
     )
     """Q's weight of the velocity of what turns."""
-    r: float = WEIGHTS.knob(0.1, 1e-4, 1e4, "r", "1/N², 1/(N·m)²", "Control", scale="log")
+    r: float = WEIGHTS.knob(0.1, 1e-4, 1e4, "r", "1/N², 1/(N·m)²", "Control", scale="log", key=True)
     """R = r I: what force or torque costs."""
-    policy: str = HORIZON.choice("steady", LQR_POLICIES, "Policy")
+    policy: str = HORIZON.choice("steady", LQR_POLICIES, "Policy", key=True)
     """The steady state's gain for ever, or those of N steps: all in turn and then over again, or
     the first of them at every step."""
     horizon: float = HORIZON.knob(100.0, 1.0, 300.0, "N", "", "Horizon", step=1.0)
@@ -58,7 +72,15 @@ class LqrParams(Params):
     limits: bool = WORLD.toggle(True, "Limits")
     """Cut every control to what the motor can give. The regulator knows of none."""
     limit: float = WORLD.knob(
-        20.0, 0.5, 200.0, "u_{max}", "N, N·m", "Strongest control", scale="log"
+        20.0,
+        0.5,
+        200.0,
+        "u_{max}",
+        "N, N·m",
+        "Strongest control",
+        scale="log",
+        key=True,
+        when=OWN_LIMIT,
     )
     """Of the cart, the pendulum and the mass; the UR5's joints have motors of their own."""
     push_force: float = WORLD.knob(

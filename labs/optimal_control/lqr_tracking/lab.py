@@ -22,7 +22,7 @@ from labs.optimal_control.lqr_tracking.params import TrackingParams
 from labs.optimal_control.lqr_tracking.picture import CART_TRAIL, draw_tracking
 from labs.optimal_control.lqr_tracking.plots import PLOTS, preview_fields
 from labs.optimal_control.lqr_tracking.tracking import COSTED_JOINT, full_preview, reference_lap
-from labs.params import Knob, Value
+from labs.params import Value
 from labs.scene import Scene
 
 LARGEST_DEVIATION = np.pi / 2
@@ -179,10 +179,10 @@ class LqrTracking(Lab[TrackingParams, TrackingState]):
         if handle != "size":
             return {}
         if params.robot == "cart-pole":
-            return {"stroke": _clip_to_range(params, "stroke", abs(point[1]))}
+            return {"stroke": params.nearest("stroke", abs(point[1]))}
         arm = mechanism("ur5")
         distance = np.linalg.norm(np.array(point) - arm.tip(arm.arm.home))
-        return {"radius": _clip_to_range(params, "radius", float(distance))}
+        return {"radius": params.nearest("radius", float(distance))}
 
     def draw(self, scene: Scene, params: TrackingParams, state: TrackingState) -> None:
         """Robot and ghost, the reference, the plan, and the past."""
@@ -211,10 +211,3 @@ def _divergence(t: float, after: list[np.ndarray], x_ref: np.ndarray) -> str:
                 "of the effort lower, and reset."
             )
     return ""
-
-
-def _clip_to_range(params: TrackingParams, name: str, value: float) -> float:
-    """The value a slider takes nearest to this one."""
-    tunable = params.tunables[name]
-    assert isinstance(tunable, Knob)
-    return float(round(min(max(value, tunable.low), tunable.high), 3))

@@ -11,6 +11,8 @@ from labs.params import Group, Params
 LONGEST_LAP = 6.0
 """[s]"""
 
+ARM, CART = {"robot": "ur5"}, {"robot": "cart-pole"}
+
 REFERENCE = Group("Reference")
 POLICY = Group("Policy")
 LINEAR_COSTS = Group("Linear costs")
@@ -21,24 +23,33 @@ class TrackingParams(Params):
     """What the user can turn."""
 
     robot: str = REFERENCE.choice(
-        "ur5", {"ur5": "UR5", "cart-pole": "Cart-pole"}, "Robot", effect="restart"
+        "ur5", {"ur5": "UR5", "cart-pole": "Cart-pole"}, "Robot", effect="restart", key=True
     )
     """An arm with six motors, or a pole kept upright on a cart with one."""
-    path: str = REFERENCE.choice("circle", {"circle": "Circle", "square": "Square"}, "Path")
+    path: str = REFERENCE.choice(
+        "circle", {"circle": "Circle", "square": "Square"}, "Path", key=True
+    )
     """Of the end-effector. The cart follows the circle's shadow, or jumps to and fro."""
-    radius: float = REFERENCE.knob(0.15, 0.0, 0.2, "A", "m", "Radius", step=0.005)
-    """Of the UR5's circle, or of the one round its square. Drag the ball on it, too."""
-    stroke: float = REFERENCE.knob(0.4, 0.0, 0.7, "A_p", "m", "Stroke", step=0.01)
+    radius: float = REFERENCE.knob(
+        0.15, 0.0, 0.2, "A", "m", "Radius", step=0.005, key=True, when=ARM
+    )
+    """Of the circle, or of the one round the square. Drag the ball on it, too."""
+    stroke: float = REFERENCE.knob(
+        0.4, 0.0, 0.7, "A_p", "m", "Stroke", step=0.01, key=True, when=CART
+    )
     """How far the cart's reference goes to either side. Drag the ball, too."""
     plane: str = REFERENCE.choice(
-        "frontal", {"frontal": "Frontal", "horizontal": "Horizontal", "side": "Side"}, "Plane"
+        "frontal",
+        {"frontal": "Frontal", "horizontal": "Horizontal", "side": "Side"},
+        "Plane",
+        when=ARM,
     )
     """Of the UR5's path."""
-    lap_time: float = REFERENCE.knob(3.0, 1.0, LONGEST_LAP, "T", "s", "Period", step=0.1)
+    lap_time: float = REFERENCE.knob(3.0, 1.0, LONGEST_LAP, "T", "s", "Period", step=0.1, key=True)
     """Of one lap. A change keeps the phase."""
     feed_forward: str = REFERENCE.choice("none", FEED_FORWARDS, "Feed-forward", "u^{ref}")
     """What the reference control holds. What it lacks is left to the feedback and to k."""
-    preview: float = POLICY.knob(60.0, 0.0, 100.0, "N", "steps", "Preview", step=1.0)
+    preview: float = POLICY.knob(60.0, 0.0, 100.0, "N", "steps", "Preview", step=1.0, key=True)
     """Steps of 20 ms that the policy sees ahead. With none it is the ghost's."""
     position_weight: float = POLICY.knob(
         100.0, 1.0, 1e4, "Q_q", "1/rad², 1/m²", "Position weight", scale="log"
@@ -48,13 +59,15 @@ class TrackingParams(Params):
         1.0, 0.01, 100.0, "Q_v", "s²/rad², s²/m²", "Velocity weight", scale="log"
     )
     """Cost of a squared error of velocity, the same for all joints."""
-    effort_weight: float = POLICY.knob(20.0, 0.1, 1e4, "R", "", "Effort weight", scale="log")
+    effort_weight: float = POLICY.knob(
+        20.0, 0.1, 1e4, "R", "", "Effort weight", scale="log", key=True
+    )
     """Cost of a control that differs from the reference control by the motor's limit."""
     lean: float = LINEAR_COSTS.knob(0.0, -20.0, 20.0, "q", "1/rad, 1/m", "Lean", step=0.1)
     """Linear cost of the place of the shoulder, or of the cart: positive pushes it back."""
     price: float = LINEAR_COSTS.knob(0.0, -20.0, 20.0, "s", "", "Price", step=0.1)
     """Linear cost of the effort at the shoulder, or the cart: positive favours negative."""
-    wind: float = WORLD.knob(0.0, -20.0, 20.0, "f_y", "N", "Wind", step=0.5)
+    wind: float = WORLD.knob(0.0, -20.0, 20.0, "f_y", "N", "Wind", step=0.5, key=True)
     """A steady force on the end-effector, or on the cart, along the world's y axis."""
     wind_known: bool = WORLD.toggle(True, "Wind known")
     """Whether the policy's model has the wind, as part of the defect c."""

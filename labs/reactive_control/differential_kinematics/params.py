@@ -7,10 +7,11 @@ import numpy as np
 
 from labs.algorithms.inverse_kinematics import INVERSE_KINEMATICS_METHODS
 from labs.algorithms.jacobian import ForwardKinematics
-from labs.models.arms import Arm, load
+from labs.models.arms import JOINTS, Arm, load
 from labs.params import Group, Params
-from labs.tasks.arm.params import joint_values, robot_choice
+from labs.tasks.arm.params import having_joint, joint_values, robot_choice
 
+ROBOTS = ("ur5", "panda", "scara")
 FRAMES = {
     "end-effector": "End-effector",
     **{f"joint-{i}": f"Frame of joint {i}" for i in range(2, 8)},
@@ -20,6 +21,7 @@ MODES = {
     "velocity": "Joint velocities",
     "follow": "Follow a target",
 }
+FOLLOWING = {"mode": "follow"}
 TASKS = {"position": "Position", "pose": "Full pose"}
 ELLIPSOIDS = {"velocity": "Velocity", "force": "Force", "both": "Both", "none": "None"}
 COLUMNS = {"all": "All", "none": "None"} | {str(i): f"Joint {i}, lever" for i in range(1, 8)}
@@ -32,6 +34,8 @@ INVERSE_KINEMATICS = Group("Inverse kinematics")
 
 
 def _angle(i: int) -> Any:
+    slides = ["scara"] if i == 3 else []
+    turns = [name for name in ROBOTS if JOINTS[name] >= i and name not in slides]
     return POSTURE.knob(
         0.0,
         -3.14,
@@ -40,8 +44,9 @@ def _angle(i: int) -> Any:
         "rad",
         f"Joint {i}",
         step=0.01,
-        help="Angle from the home posture, cut at the joint's limits. Ignored where the robot "
-        "has no such joint, and by the sliding joint of the SCARA, which has a slider of its own.",
+        key=True,
+        when={"robot": turns},
+        help="Angle from the home posture, cut at the joint's limits.",
     )
 
 
@@ -54,19 +59,19 @@ def _rate(i: int, value: float = 0.0) -> Any:
         "rad/s",
         f"Speed {i}",
         step=0.01,
-        help="Velocity of the joint; m/s where it slides. Ignored where the robot has no such "
-        "joint, and while a target is followed.",
+        when={**having_joint(i, ROBOTS), "mode": ["posture", "velocity"]},
+        help="Velocity of the joint; m/s where it slides.",
     )
 
 
 class DifferentialParams(Params):
     """What the user can turn."""
 
-    robot: str = robot_choice(ROBOT, ("ur5", "panda", "scara"))
+    robot: str = robot_choice(ROBOT, ROBOTS, key=True)
     """The arm."""
     frame: str = ROBOT.choice("end-effector", FRAMES, "Frame")
     """Whose velocity the Jacobian gives; the last one where the robot has no such joint."""
-    mode: str = ROBOT.choice("posture", MODES, "Motion", effect="live")
+    mode: str = ROBOT.choice("posture", MODES, "Motion", effect="live", key=True)
     """Stand as posed, move at the joint velocities below, or follow the target."""
     q1: float = _angle(1)
     q2: float = _angle(2)
@@ -75,8 +80,10 @@ class DifferentialParams(Params):
     q5: float = _angle(5)
     q6: float = _angle(6)
     q7: float = _angle(7)
-    lift: float = POSTURE.knob(0.0, -0.15, 0.15, "d", "m", "Slide", step=0.001)
-    """The sliding joint of the SCARA; ignored by the other robots."""
+    lift: float = POSTURE.knob(
+        0.0, -0.15, 0.15, "d", "m", "Slide", step=0.001, key=True, when={"robot": "scara"}
+    )
+    """The sliding joint of the SCARA."""
     dq1: float = _rate(1, 0.5)
     dq2: float = _rate(2)
     dq3: float = _rate(3)
@@ -92,19 +99,25 @@ class DifferentialParams(Params):
     task: str = INVERSE_KINEMATICS.choice("position", TASKS, "Task", effect="restart")
     """What must follow the target, the position alone or the orientation too; singular values are
     those of its rows of J."""
-    method: str = INVERSE_KINEMATICS.choice("damped", INVERSE_KINEMATICS_METHODS, "Method")
+    method: str = INVERSE_KINEMATICS.choice(
+        "damped", INVERSE_KINEMATICS_METHODS, "Method", key=True, when=FOLLOWING
+    )
     """How the wanted velocity of the end-effector becomes joint velocities."""
     damping: float = INVERSE_KINEMATICS.knob(
-        0.1, 0.001, 1.0, "\\lambda", "m", "Damping", scale="log"
+        0.1, 0.001, 1.0, "\\lambda", "m", "Damping", scale="log", key=True, when=FOLLOWING
     )
     """Of damped least squares: below this a singular value counts as small."""
-    gain: float = INVERSE_KINEMATICS.knob(5.0, 0.0, 50.0, "k", "1/s", "Gain", scale="log")
+    gain: float = INVERSE_KINEMATICS.knob(
+        5.0, 0.0, 50.0, "k", "1/s", "Gain", scale="log", when=FOLLOWING
+    )
     """Velocity asked per error. The error's part is cut at 0.5 m/s and 1 rad/s."""
     fastest: float = INVERSE_KINEMATICS.knob(
-        3.14, 0.5, 50.0, "\\dot q_{max}", "rad/s", "Speed limit", scale="log"
+        3.14, 0.5, 50.0, "\\dot q_{max}", "rad/s", "Speed limit", scale="log", when=FOLLOWING
     )
     """What a motor gives (m/s where it slides). All joints slow down by one factor."""
-    reach: float = INVERSE_KINEMATICS.knob(0.0, 0.0, 0.8, "A", "m", "Reach out", step=0.01)
+    reach: float = INVERSE_KINEMATICS.knob(
+        0.0, 0.0, 0.8, "A", "m", "Reach out", step=0.01, when=FOLLOWING
+    )
     """The target moves this far away from the base axis and back, in 8 s."""
 
     @property

@@ -7,7 +7,7 @@ import numpy as np
 
 from labs.algorithms.integrators import INTEGRATORS
 from labs.params import Group, Params
-from labs.tasks.arm.params import joint_values, offset_knob, robot_choice
+from labs.tasks.arm.params import having_joint, joint_values, offset_knob, robot_choice
 from labs.tasks.arm.postures import POSED_ARMS, POSTURES, posture
 
 DRIVES = {
@@ -34,7 +34,8 @@ def _torque(joint: int) -> Any:
         "N·m",
         f"Joint {joint}",
         step=0.1,
-        help="Added to what drives the joints. Without effect where there is no such joint.",
+        when=having_joint(joint),
+        help="Added to what drives the joints.",
     )
 
 
@@ -47,8 +48,8 @@ def _acceleration(joint: int, default: float = 0.0) -> Any:
         "rad/s²",
         f"Joint {joint}",
         step=0.1,
-        help="Inverse dynamics finds the torque for it. Without effect where there is no such "
-        "joint.",
+        when=having_joint(joint),
+        help="Inverse dynamics finds the torque for it.",
     )
 
 
@@ -68,13 +69,13 @@ def _force(axis: str) -> Any:
 class DynamicsParams(Params):
     """What the user can turn."""
 
-    robot: str = robot_choice(ROBOT, POSED_ARMS, effect="restart")
+    robot: str = robot_choice(ROBOT, POSED_ARMS, effect="restart", key=True)
     """The arm that moves."""
-    payload: float = ROBOT.knob(0.0, 0.0, 10.0, "m_{load}", "kg", "Payload", step=0.1)
+    payload: float = ROBOT.knob(0.0, 0.0, 10.0, "m_{load}", "kg", "Payload", step=0.1, key=True)
     """A point mass at the end-effector, known to all that is computed here."""
-    gravity: bool = ROBOT.toggle(True, "Gravity")
+    gravity: bool = ROBOT.toggle(True, "Gravity", key=True)
     """Off: g(q) = 0."""
-    drive: str = TORQUES.choice("inverse", DRIVES, "Drive")
+    drive: str = TORQUES.choice("inverse", DRIVES, "Drive", key=True)
     """What the motors do: carry the arm's weight g(q), what inverse dynamics says for the
     accelerations asked for, or nothing. The sliders add to it."""
     tau1: float = _torque(1)
@@ -84,7 +85,7 @@ class DynamicsParams(Params):
     tau5: float = _torque(5)
     tau6: float = _torque(6)
     tau7: float = _torque(7)
-    damping: float = TORQUES.knob(0.0, 0.0, 10.0, "b", "N·m·s/rad", "Damping", step=0.1)
+    damping: float = TORQUES.knob(0.0, 0.0, 10.0, "b", "N·m·s/rad", "Damping", step=0.1, key=True)
     """The motors brake with -b q' on top of all else: under a constant torque the joints then reach
     a constant speed."""
     a1: float = _acceleration(1, 1.5)
@@ -99,7 +100,7 @@ class DynamicsParams(Params):
     fx: float = _force("x")
     fy: float = _force("y")
     fz: float = _force("z")
-    posture: str = START.choice("home", POSTURES, "Posture")
+    posture: str = START.choice("home", POSTURES, "Posture", key=True)
     """Where the arm starts; the joint sliders turn it."""
     q1: float = offset_knob(START, 1)
     q2: float = offset_knob(START, 2)

@@ -15,6 +15,7 @@ CONTROLLERS = {
     "pd-gravity": "PD + gravity compensation",
     "computed-torque": "Computed torque (beyond the notes)",
 }
+CLOSED_LOOP = {"controller": ["pid", "pd-gravity", "computed-torque"]}
 REFERENCES = {"set-point": "Set point", "sinusoid": "Sinusoid", "minimum-jerk": "Minimum jerk"}
 HIGHEST_KP, HIGHEST_KD = 2000.0, 200.0
 CONTROL_PERIODS = {
@@ -50,27 +51,37 @@ PUSH = Group("Push")
 class JointParams(Params):
     """What the user can turn."""
 
-    robot: str = robot_choice(ROBOT, POSED_ARMS)
+    robot: str = robot_choice(ROBOT, POSED_ARMS, key=True)
     """The arm to control."""
-    reference: str = REFERENCE.choice("sinusoid", REFERENCES, "Reference")
+    reference: str = REFERENCE.choice("sinusoid", REFERENCES, "Reference", key=True)
     """The motion every joint should make, around the robot's home posture."""
-    amplitude: float = REFERENCE.knob(0.3, 0.0, 0.8, "A", "rad", "Amplitude", step=0.01)
+    amplitude: float = REFERENCE.knob(0.3, 0.0, 0.8, "A", "rad", "Amplitude", step=0.01, key=True)
     """How far every joint moves from home. Moving this slider moves q_ref at once."""
-    frequency: float = REFERENCE.knob(0.3, 0.05, 2.0, "f", "Hz", "Frequency", step=0.01)
+    frequency: float = REFERENCE.knob(
+        0.3, 0.05, 2.0, "f", "Hz", "Frequency", step=0.01, key=True, when={"reference": "sinusoid"}
+    )
     """Of the sinusoid. A change keeps the phase, so the reference does not jump."""
-    duration: float = REFERENCE.knob(1.5, 0.3, 5.0, "D", "s", "Duration", step=0.05)
+    duration: float = REFERENCE.knob(
+        1.5, 0.3, 5.0, "D", "s", "Duration", step=0.05, key=True, when={"reference": "minimum-jerk"}
+    )
     """Of one minimum-jerk move; a rest of half of it follows."""
     initial_error: float = REFERENCE.knob(
         0.0, -0.5, 0.5, "q(0) - q^{ref}(0)", "rad", "Initial error", effect="restart"
     )
     """How far every joint starts from where the reference starts."""
-    controller: str = CONTROLLER.choice("pd-gravity", CONTROLLERS, "Controller")
+    controller: str = CONTROLLER.choice("pd-gravity", CONTROLLERS, "Controller", key=True)
     """The law that turns the state and the reference into torques."""
-    kp: float = CONTROLLER.knob(200.0, 0.0, HIGHEST_KP, "k_p", "N·m/rad", scale="log")
+    kp: float = CONTROLLER.knob(
+        200.0, 0.0, HIGHEST_KP, "k_p", "N·m/rad", scale="log", key=True, when=CLOSED_LOOP
+    )
     """Torque per error. In computed torque an acceleration per error, 1/s²."""
-    ki: float = CONTROLLER.knob(0.0, 0.0, 2000.0, "k_i", "N·m/(rad·s)", scale="log")
+    ki: float = CONTROLLER.knob(
+        0.0, 0.0, 2000.0, "k_i", "N·m/(rad·s)", scale="log", key=True, when={"controller": "pid"}
+    )
     """Torque per integrated error, PID only. At zero the integral is emptied."""
-    kd: float = CONTROLLER.knob(30.0, 0.0, HIGHEST_KD, "k_d", "N·m·s/rad", scale="log")
+    kd: float = CONTROLLER.knob(
+        30.0, 0.0, HIGHEST_KD, "k_d", "N·m·s/rad", scale="log", key=True, when=CLOSED_LOOP
+    )
     """Torque per error of velocity. In computed torque 1/s."""
     payload: float = WORLD.knob(0.0, 0.0, 10.0, "m_{load}", "kg", "Payload", step=0.1)
     """A point mass at the end-effector that the controller does not know of."""
@@ -78,7 +89,9 @@ class JointParams(Params):
     """Viscous friction at every joint that the controller does not know of."""
     torque_limits: bool = WORLD.toggle(True, "Torque limits")
     """Cut every torque to what the motor can give. The plot shows the limits either way."""
-    noise: float = WORLD.knob(0.0, 0.0, 0.02, "\\sigma", "rad", "Sensor noise", scale="log")
+    noise: float = WORLD.knob(
+        0.0, 0.0, 0.02, "\\sigma", "rad", "Sensor noise", scale="log", when=CLOSED_LOOP
+    )
     """Standard deviation of the measured angles; of the velocities it is 10/s times this."""
     control_period: float = SIMULATION.choice(0.001, CONTROL_PERIODS, "Control period", "T", "s")
     """Time between two looks of the controller; rounded up to whole integration steps."""

@@ -10,7 +10,9 @@ from labs.algorithms.orientation import SEQUENCES
 from labs.models.arms import load
 from labs.params import Group, Params
 from labs.reactive_control.kinematics.gimbal import Gimbal
-from labs.tasks.arm.params import MAX_JOINTS, joint_values, robot_choice
+from labs.tasks.arm.params import MAX_JOINTS, having_joint, joint_values, robot_choice
+
+ROBOTS = ("ur5", "panda")
 
 JOINTS = Group("Joints")
 CHAIN = Group("Chain")
@@ -27,15 +29,16 @@ def _angle(i: int, default: float) -> Any:
         f"q_{i}",
         "rad",
         step=0.01,
-        help=f"Angle of joint {i}. The robot stops at its own limits"
-        + ("; the UR5 has no seventh joint." if i == MAX_JOINTS else "."),
+        key=True,
+        when=having_joint(i, ROBOTS),
+        help=f"Angle of joint {i}. The robot stops at its own limits.",
     )
 
 
 class KinematicsParams(Params):
     """What the user can turn."""
 
-    robot: str = robot_choice(CHAIN, ("ur5", "panda"))
+    robot: str = robot_choice(CHAIN, ROBOTS, key=True)
     """The arm: six joints or seven."""
     factor: str = CHAIN.choice(
         "moved",
@@ -54,11 +57,11 @@ class KinematicsParams(Params):
     q6: float = _angle(6, 0.5)
     q7: float = _angle(7, 0.8)
     sequence: str = ORIENTATION.choice(
-        "zyx", {name: name.upper() for name in SEQUENCES}, "Euler sequence"
+        "zyx", {name: name.upper() for name in SEQUENCES}, "Euler sequence", key=True
     )
     """About which axes the three Euler angles turn, each in the frame turned so far."""
     distance: float = GIMBAL.knob(
-        0.035, 0.0, 1.57, r"\delta", "rad", "Distance from the lock", scale="log"
+        0.035, 0.0, 1.57, r"\delta", "rad", "Distance from the lock", scale="log", key=True
     )
     """How far the middle angle of the body in the gimbal is from where it locks."""
     direction: str = GIMBAL.choice(

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 import pinocchio as pin
 
-from labs.lab import Action, Handle, Inputs, Lab, Measurement, State
+from labs.lab import Handle, Inputs, Lab, Measurement, State
 from labs.models.plant import plant
 from labs.params import Value
 from labs.plots import Bars, Line, Matrix, Readout, TimeSeries
@@ -19,8 +19,6 @@ FORCE_ARROW = 1.0 / 600.0
 """[m/N] length of the force's arrow."""
 VELOCITY_ARROW = 0.6
 """[s] length of the velocity's arrow over the velocity."""
-STRONGEST_PULL = 500.0
-"""[N] beyond which dragging pulls no harder."""
 FULL_MOMENT = 40.0
 """[N m] whose arc is as long as that of a torque at its limit."""
 NO_FORCE = 1e-9
@@ -34,10 +32,8 @@ CAMERA = {
 
 @dataclass(kw_only=True)
 class StaticsState(State):
-    """What the hand did: the rest follows from the parameters."""
+    """Time: the rest follows from the parameters."""
 
-    pull: np.ndarray
-    """(3,) [N] dragged at the arrow's tip, on top of the sliders."""
     steps: int = 0
 
 
@@ -104,34 +100,31 @@ class Statics(Lab[StaticsParams, StaticsState]):
         "Panda": {"robot": "panda"},
         "Double pendulum": {"robot": "double-pendulum", "fx": 0.0, "fy": 60.0, "fz": -40.0},
     }
-    actions = (
-        Action(
-            "let_go",
-            "Let go",
-            "Takes away the force that was dragged; the sliders' stays.",
-            group="Wrench at the end-effector",
-        ),
-    )
     handles = (Handle("pull", "The force at the end-effector."),)
 
     def init(self, params: StaticsParams, rng: np.random.Generator) -> StaticsState:
-        """Nothing dragged yet."""
-        return StaticsState(pull=np.zeros(3))
+        """At t = 0."""
+        return StaticsState()
 
     def step(self, params: StaticsParams, inputs: Inputs, state: StaticsState) -> StaticsState:
-        """Time passes, nothing moves. While the arrow's tip is held at x_h the whole force is
-        (x_h - p_e) / FORCE_ARROW; released, what differs from the sliders' force stays."""
-        pull = np.zeros(3) if "let_go" in inputs.actions else state.pull.copy()
-        if (held := inputs.handles.get("pull")) is not None:
-            wanted = (np.array(held) - plant(params.robot).tip(params.q)) / FORCE_ARROW
-            size = float(wanted @ wanted) ** 0.5
-            pull = wanted * (STRONGEST_PULL / max(size, STRONGEST_PULL)) - params.force
+        """Time passes, nothing moves."""
         steps = state.steps + 1
-        return StaticsState(t=steps * self.period, pull=pull, steps=steps)
+        return StaticsState(t=steps * self.period, steps=steps)
+
+    def edit(
+        self, params: StaticsParams, handle: str, point: tuple[float, float, float]
+    ) -> Mapping[str, Value]:
+        """The arrow's tip, dragged to x_h, makes the force (x_h - p_e) / FORCE_ARROW."""
+        if handle != "pull":
+            return {}
+        force = (np.array(point) - plant(params.robot).tip(params.q)) / FORCE_ARROW
+        return {
+            name: params.nearest(name, f) for name, f in zip(("fx", "fy", "fz"), force, strict=True)
+        }
 
     def measure(self, params: StaticsParams, state: StaticsState) -> Measurement:
         """Torque, and the power reckoned at the joints and at the end-effector."""
-        load = _load(params, state)
+        load = _load(params)
         tau, dq = load.torque, params.dq
         twist = load.jacobian @ dq
         joint_power, tip_power = float(tau @ dq), float(load.wrench @ twist)
@@ -154,7 +147,7 @@ class Statics(Lab[StaticsParams, StaticsState]):
     def fields(self, params: StaticsParams, state: StaticsState) -> Mapping[str, np.ndarray]:
         """J^T, its torque, and the singular values of J_p: |tau| for a force of 1 N along each
         of the three main directions of the force ellipsoid, the dearest first."""
-        load = _load(params, state)
+        load = _load(params)
         return {
             "torque": load.torque,
             "torque_limit": plant(params.robot).arm.torque_limit,
@@ -164,7 +157,7 @@ class Statics(Lab[StaticsParams, StaticsState]):
 
     def draw(self, scene: Scene, params: StaticsParams, state: StaticsState) -> None:
         """The arm, the wrench, and a torque arc at every joint, red beyond the motor's limit."""
-        load, world = _load(params, state), plant(params.robot)
+        load, world = _load(params), plant(params.robot)
         arm, tau, tip = world.arm, load.torque, load.tip
         scene.camera(*CAMERA[params.robot])
         scene.arm("robot", arm, params.q, effort=np.abs(tau) / arm.torque_limit)
@@ -184,14 +177,14 @@ class Statics(Lab[StaticsParams, StaticsState]):
         scene.handle("pull", end, 0.04)
 
 
-def _load(params: StaticsParams, state: StaticsState) -> Load:
+def _load(params: StaticsParams) -> Load:
     world = plant(params.robot)
     axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     tip = world.tip(params.q)
     jacobian = pin.computeFrameJacobian(
         world.model, world.data, params.q, world.arm.tip, axes
     ).copy()
-    wrench = np.concatenate([params.force + state.pull, params.moment])
+    wrench = np.concatenate([params.force, params.moment])
     return Load(tip, jacobian, wrench)
 
 

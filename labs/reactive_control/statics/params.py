@@ -6,7 +6,7 @@ import numpy as np
 
 from labs.models.arms import load
 from labs.params import Group, Params
-from labs.tasks.arm.params import joint_values, offset_knob, robot_choice
+from labs.tasks.arm.params import having_joint, joint_values, offset_knob, robot_choice
 from labs.tasks.arm.postures import POSED_ARMS, POSTURES, posture
 
 POSTURE = Group("Posture")
@@ -23,6 +23,7 @@ def _speed(joint: int, default: float = 0.0) -> Any:
         "rad/s",
         f"Joint {joint}",
         step=0.01,
+        when=having_joint(joint),
         help="The motion whose power is reckoned; the arm itself stays where it is.",
     )
 
@@ -36,7 +37,8 @@ def _force(axis: str, default: float) -> Any:
         "N",
         f"Force {axis}",
         step=1.0,
-        help="In the world's axes. What was dragged in the scene adds to it.",
+        key=True,
+        help="In the world's axes; or drag the ball at the arrow's tip.",
     )
 
 
@@ -56,9 +58,9 @@ def _moment(axis: str) -> Any:
 class StaticsParams(Params):
     """What the user can turn."""
 
-    robot: str = robot_choice(POSTURE, POSED_ARMS, effect="restart")
+    robot: str = robot_choice(POSTURE, POSED_ARMS, effect="restart", key=True)
     """The arm that is pulled at."""
-    posture: str = POSTURE.choice("home", POSTURES, "Posture")
+    posture: str = POSTURE.choice("home", POSTURES, "Posture", key=True)
     """What the joint sliders turn."""
     q1: float = offset_knob(POSTURE, 1)
     q2: float = offset_knob(POSTURE, 2)

@@ -20,8 +20,8 @@ BRUSHES = {"#": "Wall, or none", "G": "Goal", "S": "Start", "C": "Cliff", ".": "
 
 
 WORLD = Group("World", effect="restart")
-GRID_WORLD = Group("Grid world", effect="solve")
-PENDULUM = Group("Pendulum", effect="solve")
+GRID_WORLD = Group("Grid world", effect="solve", when={"world": "grid"})
+PENDULUM = Group("Pendulum", effect="solve", when={"world": "pendulum"})
 ITERATIONS = Group("Iterations", effect="solve")
 FINITE_HORIZON = Group("Finite horizon")
 TABLE_SIZE = Group("Curse of dimensionality")
@@ -30,24 +30,30 @@ TABLE_SIZE = Group("Curse of dimensionality")
 class DynamicProgrammingParams(Params):
     """What the user can turn."""
 
-    world: str = WORLD.choice("grid", {"grid": "Grid world", "pendulum": "Pendulum"}, "World")
+    world: str = WORLD.choice(
+        "grid", {"grid": "Grid world", "pendulum": "Pendulum"}, "World", key=True
+    )
     """A map to walk on, or a pendulum whose motor is too weak to lift it at once."""
-    gamma: float = WORLD.knob(0.95, 0.0, 1.0, r"\gamma", "", "Discount", step=0.005, effect="solve")
+    gamma: float = WORLD.knob(
+        0.95, 0.0, 1.0, r"\gamma", "", "Discount", step=0.005, effect="solve", key=True
+    )
     """Weight of the next step's cost. Every sweep brings the error down by it, at least."""
     map: MapText = GRID_WORLD.text(POCKET, "Map", rows=8)
     """# wall, . free, S start, G goal, C cliff; a last row of digits is the wind upwards. Or click
     on the cells."""
-    brush: str = GRID_WORLD.choice("#", BRUSHES, "A click makes", effect="live")
+    brush: str = GRID_WORLD.choice("#", BRUSHES, "A click makes", effect="live", key=True)
     """What a clicked cell becomes."""
-    slip: float = GRID_WORLD.knob(0.0, 0.0, 0.8, "p", "", "Slip", step=0.01)
+    slip: float = GRID_WORLD.knob(0.0, 0.0, 0.8, "p", "", "Slip", step=0.01, key=True)
     """Probability that a step goes in a direction drawn evenly instead."""
     kings: bool = GRID_WORLD.toggle(False, "Diagonal steps")
     """Eight controls, the king's moves, instead of four."""
-    nodes: float = PENDULUM.knob(51, 11, 101, "n", "", "Grid size", step=2)
+    nodes: float = PENDULUM.knob(51, 11, 101, "n", "", "Grid size", step=2, key=True)
     """Angles, and as many velocities: the table has n² rows."""
     levels: float = PENDULUM.knob(5, 3, 11, "n_u", "", "Torque levels", step=2)
     """Columns of the table."""
-    torque: float = PENDULUM.knob(2.5, 0.5, 6.0, r"u_{\max}", "N·m", "Torque limit", step=0.05)
+    torque: float = PENDULUM.knob(
+        2.5, 0.5, 6.0, r"u_{\max}", "N·m", "Torque limit", step=0.05, key=True
+    )
     """To hold the rod level takes 4.9 N·m: with less it has to be swung up."""
     w_v: float = PENDULUM.knob(0.05, 0.0, 1.0, "w_v", "s²/rad²", "Cost of velocity", scale="log")
     """Beside 1 for the square of the angle from upright [rad]."""
@@ -58,6 +64,7 @@ class DynamicProgrammingParams(Params):
         ITERATION_METHODS | {"finite": "Finite horizon"},
         "Shown and followed",
         effect="live",
+        key=True,
     )
     """Whose values and policy the scene shows, and who drives the walker or the pendulum."""
     m: float = ITERATIONS.knob(5, 1, 50, "m_k", "", "Evaluations", step=1)
@@ -70,7 +77,9 @@ class DynamicProgrammingParams(Params):
     """Drawn from 0 to this, by the seed, the same for all."""
     warm: bool = ITERATIONS.toggle(True, "Go on from present values")
     """When the world changes; off: from the initial values again."""
-    to_go: float = FINITE_HORIZON.knob(12, 0, HORIZON, "N-i", "steps", "Time to go", step=1)
+    to_go: float = FINITE_HORIZON.knob(
+        12, 0, HORIZON, "N-i", "steps", "Time to go", step=1, key=True
+    )
     """How many steps are left."""
     w_f: float = FINITE_HORIZON.knob(3.0, 0.0, 10.0, "w_f", "", "Final cost", step=0.1)
     """Of each cell (each radian) left to the goal in a straight line."""

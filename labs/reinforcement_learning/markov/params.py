@@ -15,6 +15,11 @@ MAX_SHOWN_STATES = 12
 """States that a circle and a chooser still hold."""
 NUMBERS = {str(x + 1): str(x + 1) for x in range(MAX_SHOWN_STATES)}
 
+CONTROLLED = {"chain": ["machine", "table"]}
+"""Chains that have several controls, or may have."""
+EDITABLE = {"chain": [name for name in TITLES if name != "machine"]}
+"""Chains that have one, or may have one."""
+
 CHAIN = Group("Chain", effect="restart")
 PROBABILITIES = Group("Probabilities", effect="solve")
 COSTS = Group("Costs", effect="solve")
@@ -24,34 +29,41 @@ WALK = Group("Walk")
 class MarkovParams(Params):
     """What the user can turn."""
 
-    chain: str = CHAIN.choice("student", TITLES, "Chain")
+    chain: str = CHAIN.choice("student", TITLES, "Chain", key=True)
     """The states, their probabilities and costs. The machine has two controls."""
-    number: float = CHAIN.knob(1.0, 1.0, 41.0, "n", "", "Which random chain", step=1.0)
-    """Each number is another one of six states, for the random chain only."""
+    number: float = CHAIN.knob(
+        1.0, 1.0, 41.0, "n", "", "Which random chain", step=1.0, key=True, when={"chain": "random"}
+    )
+    """Each number is another one of six states."""
     table: str = CHAIN.text(
         "state, cost, Sun, Rain, Snow\nSun, 0, 2/3, 1/3, 0\nRain, 1, 1/2, 1/4, 1/4\n"
         "Snow, 3, 0, 1/2, 1/2",
         "Your table",
         rows=5,
         max_length=4000,
+        when={"chain": "table"},
     )
-    """For your own chain. CSV: a heading (state, control if any, cost, the states), then a row
+    """CSV: a heading (state, control if any, cost, the states), then a row
     each; or JSON: [{"state": "A", "cost": 1, "to": {"A": 1}}]."""
-    source: str = PROBABILITIES.choice("1", NUMBERS, "From state")
+    source: str = PROBABILITIES.choice("1", NUMBERS, "From state", key=True)
     """Whose beads lie on its ribbons; a click on a state's tile chooses it, too."""
-    target: str = PROBABILITIES.choice("2", NUMBERS, "To state")
+    target: str = PROBABILITIES.choice("2", NUMBERS, "To state", key=True, when=EDITABLE)
     """Where the transition leads whose probability is shifted."""
-    shift: float = PROBABILITIES.knob(0.0, -1.0, 1.0, "s", "", "Shift it", step=0.01)
+    shift: float = PROBABILITIES.knob(
+        0.0, -1.0, 1.0, "s", "", "Shift it", step=0.01, key=True, when=EDITABLE
+    )
     """Down to -1: never. Up to 1: always. The others of its row keep their proportions."""
-    rows: str = PROBABILITIES.text("", "Changed rows", rows=3, max_length=1000)
+    rows: str = PROBABILITIES.text("", "Changed rows", rows=3, max_length=1000, when=EDITABLE)
     """Beads that are dragged write here: a state and its weights, 1: 0 0.5 0.5. For chains without
     controls."""
-    gamma: float = COSTS.knob(0.9, 0.0, 1.0, r"\gamma", "", "Discount", step=0.01)
+    gamma: float = COSTS.knob(0.9, 0.0, 1.0, r"\gamma", "", "Discount", step=0.01, key=True)
     """What the cost of the next step counts today."""
-    first: float = COSTS.knob(1.0, 0.0, 1.0, r"\pi(u_1 \mid x)", "", "First control", step=0.01)
+    first: float = COSTS.knob(
+        1.0, 0.0, 1.0, r"\pi(u_1 \mid x)", "", "First control", step=0.01, key=True, when=CONTROLLED
+    )
     """How often the policy takes the first control of a table that has several, in every state; the
     others share what is left."""
-    pace: float = WALK.knob(1.5, 0.2, 200.0, r"1/T", "1/s", "Steps a second", scale="log")
+    pace: float = WALK.knob(1.5, 0.2, 200.0, r"1/T", "1/s", "Steps a second", scale="log", key=True)
     """Of the token."""
 
     @field_validator("table", "rows")

@@ -4,7 +4,7 @@ import numpy as np
 
 from labs.algorithms import exploration
 from labs.algorithms.exploration import BehaviourPolicy
-from labs.params import Group, Params
+from labs.params import Group, Params, When
 from labs.problems.episodes import UpdateRule
 from labs.reinforcement_learning.td_control.tasks import (
     LARGEST_GAMMA,
@@ -36,77 +36,146 @@ BATCHES = 250
 DIVERGED = 1e6
 """Times the largest cost: what no estimate reaches that converges."""
 
+GRID = {"system": "grid"}
+
 WORLD = Group("World", effect="solve")
 LEARNING = Group("Learning", effect="solve")
 EXPLORATION = Group("Exploration", effect="solve")
 VIEW = Group("View")
 
 
+def _either(method: str) -> When:
+    """Where one of the two methods is this one."""
+    return ({"method": method}, {"second": method})
+
+
 class TdParams(Params):
     """What the user can turn."""
 
     system: str = WORLD.choice(
-        "grid", {"grid": "Grid world", "pendulum": "Pendulum"}, "World", effect="restart"
+        "grid", {"grid": "Grid world", "pendulum": "Pendulum"}, "World", effect="restart", key=True
     )
     """A walk to the goal of the map below, or a pendulum that a weak motor swings up."""
-    map: MapText = WORLD.text(MAPS["cliff"], "Map", rows=8)
+    map: MapText = WORLD.text(MAPS["cliff"], "Map", rows=8, when=GRID)
     """S start, G goal, # wall, C cliff, . free; a last row of digits is wind, upwards."""
     brush: str = WORLD.choice(
         "G",
         {"G": "moves the goal", "S": "moves the start", "#": "walls up", "C": "makes cliff"},
         "A click on a cell",
         effect="live",
+        when=GRID,
     )
     """And walls or cliff clicked once more are free again."""
-    kings: bool = WORLD.toggle(False, "King's moves", effect="restart")
+    kings: bool = WORLD.toggle(False, "King's moves", effect="restart", when=GRID)
     """Diagonal steps too: eight controls instead of four."""
-    slip: float = WORLD.knob(0.0, 0.0, 0.5, r"p_{slip}", "", "Slip", step=0.01)
+    slip: float = WORLD.knob(0.0, 0.0, 0.5, r"p_{slip}", "", "Slip", step=0.01, when=GRID)
     """Probability that a step on the grid goes wherever it likes."""
     gamma: float = WORLD.knob(1.0, 0.0, 1.0, r"\gamma", "", "Discount", step=0.01)
     """Of the next step's cost. The pendulum's task never ends: 0.99 at most there."""
-    effort: float = WORLD.knob(0.05, 0.0, 1.0, "w_u", "1/(N·m)²", "Price of torque", scale="log")
+    effort: float = WORLD.knob(
+        0.05,
+        0.0,
+        1.0,
+        "w_u",
+        "1/(N·m)²",
+        "Price of torque",
+        scale="log",
+        when={"system": "pendulum"},
+    )
     """In the pendulum's cost, dt (e² + 0.05 v² + w_u τ²)."""
     anywhere: bool = WORLD.toggle(False, "Start anywhere")
     """Episodes begin in any state instead of the start."""
 
-    method: str = LEARNING.choice("q-learning", LEARNING_METHODS, "Method", effect="restart")
+    method: str = LEARNING.choice(
+        "q-learning", LEARNING_METHODS, "Method", effect="restart", key=True
+    )
     """Blue in the scene."""
     second: str = LEARNING.choice(
-        "sarsa", {"none": "None", **LEARNING_METHODS}, "Second method", effect="restart"
+        "sarsa", {"none": "None", **LEARNING_METHODS}, "Second method", effect="restart", key=True
     )
     """Orange. Both begin with the same luck."""
-    n: float = LEARNING.knob(4, 1, 20, "n", "", "Steps", step=1)
+    n: float = LEARNING.knob(4, 1, 20, "n", "", "Steps", step=1, key=True, when=_either("sarsa-n"))
     """Costs that SARSA(n) waits for before it trusts its estimate of the rest."""
-    decay: float = LEARNING.knob(0.5, 0.0, 1.0, r"\lambda", "", "Trace decay", step=0.01)
+    decay: float = LEARNING.knob(
+        0.5,
+        0.0,
+        1.0,
+        r"\lambda",
+        "",
+        "Trace decay",
+        step=0.01,
+        key=True,
+        when=_either("sarsa-lambda"),
+    )
     """Of SARSA(λ): 0 is SARSA, 1 waits for all costs of the episode."""
-    replacing: bool = LEARNING.toggle(False, "Replacing traces")
+    replacing: bool = LEARNING.toggle(False, "Replacing traces", when=_either("sarsa-lambda"))
     """A pair met again has trace 1 instead of one more; keeps SARSA(λ) from diverging."""
-    offline: bool = LEARNING.toggle(False, "Learn at the end")
+    offline: bool = LEARNING.toggle(False, "Learn at the end", when=_either("sarsa-lambda"))
     """SARSA(λ) takes all updates of an episode at its end."""
-    alpha: float = LEARNING.knob(0.5, 0.0, 1.0, r"\alpha", "", "Step size", step=0.01)
+    alpha: float = LEARNING.knob(0.5, 0.0, 1.0, r"\alpha", "", "Step size", step=0.01, key=True)
     """How far one surprise moves an estimate."""
     omega: float = LEARNING.knob(0.0, 0.0, 1.0, r"\omega", "", "Step decay", step=0.01)
     """The k-th update has α/k^ω: 0 is constant, above 1/2 Robbins-Monro."""
     q0: float = LEARNING.knob(0.0, 0.0, 50.0, "Q_0", "", "First guess", step=0.5, effect="restart")
     """Of every Q. Below the truth is optimistic, above pessimistic."""
-    episodes: float = LEARNING.knob(500, BATCHES, 2000, "K", "", "Episodes", scale="log")
+    episodes: float = LEARNING.knob(500, BATCHES, 2000, "K", "", "Episodes", scale="log", key=True)
     """Of one training, each of ten learners (pendulum: five); in about 250 batches."""
-    explorer: str = EXPLORATION.choice("epsilon-greedy", EXPLORATIONS, "Exploration")
+    explorer: str = EXPLORATION.choice("epsilon-greedy", EXPLORATIONS, "Exploration", key=True)
     """Who decides while learning. The other controller walks along the top row, or is PD."""
     epsilon: float = EXPLORATION.knob(
-        0.1, 0.0, 1.0, r"\varepsilon", "", "Chance of any control", step=0.01
+        0.1,
+        0.0,
+        1.0,
+        r"\varepsilon",
+        "",
+        "Chance of any control",
+        step=0.01,
+        key=True,
+        when={"explorer": ["epsilon-greedy", "follow"]},
     )
-    """For ε-greedy and for the other controller."""
-    fading: float = EXPLORATION.knob(0.0, 0.0, 1.0, "d", "", "Fading", step=0.01)
+    """That it is tried instead of the best, or of the other controller's."""
+    fading: float = EXPLORATION.knob(
+        0.0,
+        0.0,
+        1.0,
+        "d",
+        "",
+        "Fading",
+        step=0.01,
+        when={"explorer": ["epsilon-greedy", "boltzmann", "follow"]},
+    )
     """At the k-th visit of a state ε/k^d: above 0 greedy in the limit (GLIE); β grows."""
     beta: float = EXPLORATION.knob(
-        1.0, 0.01, 100.0, r"\beta", "", "Inverse temperature", scale="log"
+        1.0,
+        0.01,
+        100.0,
+        r"\beta",
+        "",
+        "Inverse temperature",
+        scale="log",
+        key=True,
+        when={"explorer": "boltzmann"},
     )
-    """Boltzmann: 0 tries all alike, large is greedy."""
-    bound: float = EXPLORATION.knob(1.0, 0.0, 100.0, "L", "", "Confidence", scale="log")
+    """0 tries all alike, large is greedy."""
+    bound: float = EXPLORATION.knob(
+        1.0,
+        0.0,
+        100.0,
+        "L",
+        "",
+        "Confidence",
+        scale="log",
+        key=True,
+        when={"explorer": "confidence"},
+    )
     """Width of the confidence bound, in units of cost."""
 
-    shown: str = VIEW.choice("first", {"first": "First", "second": "Second"}, "Values of method")
+    shown: str = VIEW.choice(
+        "first",
+        {"first": "First", "second": "Second"},
+        "Values of method",
+        when={"second": list(LEARNING_METHODS)},
+    )
     """Whose estimates colour the scene and the maps."""
     learner: float = VIEW.knob(1, 1, 10, "s", "", "Learner", step=1)
     """Which of those who learn side by side is shown."""

@@ -1,21 +1,28 @@
 """Tunables that labs of robot arms share: which arm, and a knob for each of its joints."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
-from labs.models.arms import TITLES
-from labs.params import Effect, Group, Params
+from labs.models.arms import JOINTS, TITLES
+from labs.params import Group, Params
+from labs.tasks.arm.postures import POSED_ARMS
+from labs.tunables import Choices, Shared
 
 MAX_JOINTS = 7
 """Knobs a group has for the joints; an arm with fewer joints ignores the last ones."""
 
 
-def robot_choice(group: Group, names: Sequence[str], *, effect: Effect | None = None) -> Any:
+def robot_choice(group: Group, names: Sequence[str], **shared: Unpack[Shared]) -> Any:
     """One of the arms of these names (`labs.models.arms`), at first the first."""
     titles = {name: TITLES[name] for name in names}
-    return group.choice(names[0], titles, "Robot", effect=effect)
+    return group.choice(names[0], titles, "Robot", **shared)
+
+
+def having_joint(joint: int, names: Sequence[str] = POSED_ARMS) -> Choices:
+    """Where `robot`, one of these names, has this joint, from 1."""
+    return {"robot": [name for name in names if JOINTS[name] >= joint]}
 
 
 def offset_knob(group: Group, joint: int) -> Any:
@@ -28,8 +35,8 @@ def offset_knob(group: Group, joint: int) -> Any:
         "rad",
         f"Joint {joint}",
         step=0.01,
-        help="Turns this joint away from the posture chosen. Without effect where the robot has "
-        "no such joint.",
+        when=having_joint(joint),
+        help="Turns this joint away from the posture chosen.",
     )
 
 

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from labs.errors import LabError
-from labs.models.arms import ARMS, Arm, load
+from labs.models.arms import ARMS, JOINTS, Arm, load
 
 
 @pytest.fixture(params=list(ARMS))
@@ -19,6 +19,7 @@ def test_an_arm_is_consistent(arm: Arm) -> None:
     model = arm.model
     assert load(arm.name) is arm
     assert arm.home.shape == (model.nq,) == (model.nv,) == arm.torque_limit.shape
+    assert JOINTS[arm.name] == model.nv
     assert np.all(np.isfinite(arm.torque_limit))
     assert np.all(arm.torque_limit > 0)
     assert arm.tip < model.nframes

@@ -8,9 +8,10 @@ from pydantic import field_validator
 
 from labs.colors import sequential
 from labs.lab import Handle, Inputs, Lab, Measurement, State
-from labs.params import LONGEST_TEXT, Group, Params, Value
+from labs.params import Group, Params, Value
 from labs.plots import Line, TimeSeries
 from labs.scene import Scene, cell_at, cell_centers
+from labs.tunables import LONGEST_TEXT
 
 SIZE = 0.1
 """[m] The side of a cell."""

@@ -15,13 +15,13 @@ KNOBS = Group()
 
 
 class OscillatorParams(Params):
-    omega: float = KNOBS.knob(2.0, 0.1, 10.0, r"\omega", "rad/s", "ω")
+    omega: float = KNOBS.knob(2.0, 0.1, 10.0, r"\omega", "rad/s", "ω", key=True)
     """Frequency."""
-    gain: float = KNOBS.knob(10.0, 0.0, 1000.0, "k_p", "1/s", scale="log")
+    gain: float = KNOBS.knob(10.0, 0.0, 1000.0, "k_p", "1/s", scale="log", key=True)
     """Gain."""
-    shape: str = KNOBS.choice("sine", {"sine": "Sine", "square": "Square"}, "Shape")
+    shape: str = KNOBS.choice("sine", {"sine": "Sine", "square": "Square"}, "Shape", key=True)
     """Form."""
-    noisy: bool = KNOBS.toggle(False, "Noise")
+    noisy: bool = KNOBS.toggle(False, "Noise", key=True)
     """Adds noise."""
     start: float = KNOBS.knob(1.0, -1.0, 1.0, "x_0", "m", effect="restart")
     """Where it starts."""

@@ -235,7 +235,7 @@ def test_the_reference_stays_put_between_sizes_dragged() -> None:
     y, z = 0.10921554, 0.39155939
     assert lab.edit(arm, "size", (0.515, y + 0.1, z))["radius"] == pytest.approx(0.1, abs=1e-3)
     assert lab.edit(arm, "size", (3.0, 0.0, 0.0)) == {"radius": 0.2}
-    assert lab.edit(cart, "size", (-0.1, -0.333, 0.75)) == {"stroke": 0.333}
+    assert lab.edit(cart, "size", (-0.1, -0.333, 0.75)) == {"stroke": 0.33}
     assert lab.edit(cart, "other", (0.0, 0.0, 0.0)) == {}
 
 

@@ -29,6 +29,7 @@ from mdit_py_plugins.dollarmath import dollarmath_plugin
 from labs.engine.catalog import Entry
 from labs.errors import LabError
 from labs.params import Params, Value
+from server.formulas import statements
 
 _math = math_core.LatexToMathML(fancy_error=False)
 
@@ -114,8 +115,11 @@ class _Writer:
         return self.symbols.inline(tokens[i].content)
 
     def _display(self, tokens: Sequence[Token], i: int, *_: Any) -> str:
-        formula = self.symbols.mark(tex(tokens[i].content.strip(), True))
-        return f'<div class="formula">{formula}</div>\n'
+        """In pieces, between which a narrow column breaks the line."""
+        source = tokens[i].content
+        lines = [[tex(piece, True) for piece in pieces] for pieces in statements(source)]
+        spans = [f"<span>{self.symbols.mark('<wbr>'.join(pieces))}</span>" for pieces in lines]
+        return f'<div class="formula">{" ".join(spans)}</div>\n'
 
     def _table_open(self, *_: Any) -> str:
         return '<div class="table"><table>\n'

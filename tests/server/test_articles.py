@@ -6,6 +6,7 @@ import pytest
 
 from labs.engine.catalog import Entry, catalog
 from server.articles import Article, ArticleError, render, render_text, tex, words
+from server.formulas import statements
 
 COURSE = [entry for entry in catalog().values() if entry.package.startswith("labs.")]
 EXPERIMENT = """```experiment
@@ -44,6 +45,24 @@ def test_formulas_become_mathml(entry: Entry) -> None:
     html = write(entry, "Inline $x^2$ and\n\n$$\\frac{a}{b}$$\n").html
     assert "<math><msup>" in html
     assert '<math display="block"><mfrac>' in html
+
+
+@pytest.mark.parametrize(
+    ("source", "pieces"),
+    [
+        (r"a = b + c \quad d \le -e", [["a", "{}= b", "{}+ c"], ["d", r"{}\le -e"]]),
+        (
+            r"f\left(a = b\right) - |c + d| = e^+",
+            [[r"f\left(a = b\right)", "{}- |c + d|", "{}= e^+"]],
+        ),
+        (
+            r"\begin{cases} a & b = c \\ d \end{cases}",
+            [[r"\begin{cases} a & b = c \\ d \end{cases}"]],
+        ),
+    ],
+)
+def test_a_formula_breaks_between_its_terms_alone(source: str, pieces: list[list[str]]) -> None:
+    assert statements(source) == pieces
 
 
 def test_bad_tex_names_the_article_and_the_formula(entry: Entry) -> None:

@@ -143,6 +143,7 @@ session.addEventListener("status", ({ detail: status }) => {
   solver.show(status.solver);
   experiments.show(status.params);
   knobs.show(status.params);
+  board.choose(status.params);
   link = linkOf(lab.params, status.params, status.seed);
   writeLink(link);
   if (status.trouble) {

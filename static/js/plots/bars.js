@@ -17,6 +17,7 @@ export class Bars {
     this.values = fields[this.plot.field].flat();
     this.limits = fields[this.plot.limit]?.flat() ?? [];
     this.marks = fields[this.plot.marks]?.flat() ?? [];
+    this.names = fields[this.plot.names] ?? null;
     this.draw();
   }
 
@@ -27,7 +28,7 @@ export class Bars {
     const fits = this.y && this.y[0] <= wanted[0] && this.y[1] >= wanted[1];
     if (!fits || this.y[1] - this.y[0] > 3 * (wanted[1] - wanted[0])) this.y = wanted;
     const chart = this.chart;
-    chart.begin([0.4, n + 0.6], this.y, { xTicks: n > 30 ? null : this.values.map((_, i) => i + 1) });
+    chart.begin([0.4, n + 0.6], this.y, { xTicks: n > 30 ? null : this.values.map((_, i) => i + 1), xNames: this.names });
     this.values.forEach((value, i) => {
       if (!Number.isFinite(value)) return;
       const [a, b] = [chart.y(Math.max(0, value)), chart.y(Math.min(0, value))];

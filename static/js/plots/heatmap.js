@@ -2,6 +2,7 @@
 
 /* global Plotly */
 import { card } from "./card.js";
+import { fill } from "./labels.js";
 import { colour } from "./palette.js";
 
 const EVERY = 250; // [ms] between redraws
@@ -43,9 +44,11 @@ export class HeatMap {
   }
 
   update(fields) {
-    const { x, y, z } = this.plot;
+    const { x, y, z, arrows } = this.plot;
     if (!fields[z]) return;
     this.data = { x: fields[x], y: fields[y], z: fields[z] };
+    this.arrows = arrows ? fields[arrows] : [];
+    this.labels = [this.plot.x_label, this.plot.y_label, this.plot.z_label].map((text) => fill(text, fields));
     this.draw();
   }
 
@@ -57,7 +60,7 @@ export class HeatMap {
     if (!this.ready || !this.visible || !this.data) return;
     if (!now && performance.now() - this.drawnAt < EVERY) return;
     this.drawnAt = performance.now();
-    const { x_label: xLabel, y_label: yLabel, z_label: zLabel } = this.plot;
+    const [xLabel, yLabel, zLabel] = this.labels;
     const size = 0.75 * parseFloat(getComputedStyle(document.documentElement).fontSize);
     const axis = (text) => ({ title: { text, standoff: 6 }, gridcolor: colour("grid"), zeroline: false, ticks: "" });
     const trace = {
@@ -71,7 +74,26 @@ export class HeatMap {
       font: { family: "system-ui, sans-serif", size, color: colour("axis") },
       xaxis: axis(xLabel), yaxis: axis(yLabel), uirevision: "keep",
     };
-    Plotly.react(this.body, [trace], layout, { displayModeBar: false, doubleClick: "reset" });
+    Plotly.react(this.body, [trace, ...this.arrowTraces()], layout, { displayModeBar: false, doubleClick: "reset" });
+  }
+
+  // Arrows as marks, white with a dark rim: they stand out on every colour of the map. As large as
+  // so many have room.
+  arrowTraces() {
+    if (!this.arrows.length) return [];
+    const area = 0.5 * this.body.clientWidth * this.body.clientHeight;
+    const room = Math.min(20, Math.max(6, 0.6 * Math.sqrt(area / this.arrows.length)));
+    const lengths = this.arrows.map(([, , right, up]) => Math.hypot(right, up));
+    return [{
+      type: "scatter", mode: "markers", hoverinfo: "skip",
+      x: this.arrows.map(([at]) => at), y: this.arrows.map(([, at]) => at),
+      marker: {
+        symbol: lengths.map((length) => (length ? "arrow" : "circle")),
+        size: lengths.map((length) => (length ? room * (0.5 + 0.5 * length) : 5)),
+        angle: this.arrows.map(([, , right, up]) => (180 / Math.PI) * Math.atan2(right, up)),
+        color: "#ffffff", opacity: 1, line: { color: "#14171c", width: 1 },
+      },
+    }];
   }
 
   clear() {}

@@ -3,6 +3,8 @@
 /* global uPlot */
 import { number } from "../format.js";
 import { card, element } from "./card.js";
+import { fill } from "./labels.js";
+import { DASHES, drawMark, swatch } from "./marks.js";
 import { colour, SERIES } from "./palette.js";
 import { symbol } from "./symbol.js";
 
@@ -13,7 +15,7 @@ export class TimeSeries {
   constructor(plot, board) {
     this.plot = plot;
     this.board = board;
-    Object.assign(this, card(plot.title, plot.unit));
+    Object.assign(this, card(plot.title));
     this.hidden = new Set(); // lines and components switched off in the legend
     this.span = null; // the y range shown last
     this.readAt = 0;
@@ -45,10 +47,19 @@ export class TimeSeries {
     });
     for (const curve of curves) {
       const several = this.components > 1 && curve.c !== null;
-      const tone = `series-${((several ? curve.c : curve.l) % SERIES) + 1}`;
-      curve.tone = curve.line.style === "limit" ? "limit" : tone;
+      const limit = curve.line.style === "limit";
+      curve.series = limit ? 0 : ((several ? curve.c : curve.l) % SERIES) + 1;
+      curve.tone = limit ? "limit" : `series-${curve.series}`;
     }
     this.curves = curves;
+    this.marked = new Set(curves.map(({ series }) => series).filter(Boolean)).size > 1;
+  }
+
+  // The unit of what is shown; empty where the components shown have several.
+  get unit() {
+    const shown = [...new Set(this.curves.map(({ c }) => c))];
+    const units = new Set(shown.map((c) => fill(this.plot.unit, this.board.labels, c)));
+    return units.size === 1 ? [...units][0] : "";
   }
 
   // Builds the chart anew: for other columns, another selection or another theme.
@@ -82,6 +93,7 @@ export class TimeSeries {
       series: [{}, ...this.curves.map((curve) => this.series(curve))],
       hooks: {
         drawAxes: [(u) => this.drawAreas(u), (u) => this.drawGhost(u)],
+        draw: [(u) => this.drawMarks(u)],
         setSelect: [(u) => this.zoom(u)],
         setCursor: [() => this.readOut(true)],
       },
@@ -93,7 +105,7 @@ export class TimeSeries {
   }
 
   series({ line, tone, l, c }) {
-    const dash = { dash: [7, 5], limit: [3, 4] }[line.style];
+    const dash = DASHES[line.style];
     const limit = line.style === "limit";
     const area = this.isArea(line);
     return {
@@ -227,6 +239,27 @@ export class TimeSeries {
     ctx.restore();
   }
 
+  // A mark on each curve every so often, at times of its own: they move with the curves.
+  drawMarks(u) {
+    const [t, ...all] = u.data;
+    if (!this.marked || t.length < 2) return;
+    const every = roundStep((u.scales.x.max - u.scales.x.min) / 6);
+    const rim = colour("surface");
+    this.curves.forEach(({ series, tone, line }, i) => {
+      if (!series || !u.series[i + 1].show || this.isArea(line)) return;
+      u.ctx.fillStyle = colour(tone);
+      let k = Math.ceil(t[0] / every - series / 9);
+      for (let time = every * (k + series / 9); time <= t[t.length - 1]; time = every * (++k + series / 9)) {
+        const at = u.valToIdx(time);
+        const value = all[i][at];
+        const [x, y] = [u.valToPos(t[at], "x", true), u.valToPos(value, "y", true)];
+        const { left, top, width, height } = u.bbox;
+        const within = x > left && x < left + width && y > top && y < top + height;
+        if (Number.isFinite(value) && within) drawMark(u.ctx, series, x, y, rim);
+      }
+    });
+  }
+
   zoom(u) {
     const { left, width } = u.select;
     if (width < 4) return;
@@ -239,22 +272,29 @@ export class TimeSeries {
   writeLegend() {
     this.legend.replaceChildren();
     this.values = [];
+    this.setUnit(this.unit);
     const several = this.components > 1;
     const lines = new Map(this.curves.map((curve) => [curve.l, curve]));
-    for (const [l, { line, tone, c }] of lines) {
-      const button = this.switch(`l${l}`, this.isArea(line) ? "area" : line.style, several && line.style !== "limit" ? "axis" : tone);
+    for (const [l, { line, tone, series, c }] of lines) {
+      const style = this.isArea(line) ? "area" : line.style;
+      const mark = this.marked && !several && style !== "area" ? series : 0;
+      const button = this.switch(`l${l}`, style, several && style !== "limit" ? "axis" : tone, mark);
       button.append(symbol(line.mathml, several ? null : c));
       if (!several) this.values.push([l, button.appendChild(element("output", "", "—"))]);
     }
+    const { labels } = this.board;
     for (let c = 0; several && c < this.components; c++) {
-      this.switch(`c${c}`, "part", `series-${(c % SERIES) + 1}`).append(String(c + 1));
+      const series = (c % SERIES) + 1;
+      const button = this.switch(`c${c}`, "part", `series-${series}`, series);
+      button.append(labels[this.plot.select]?.[c] ?? String(c + 1));
+      if (!this.unit && this.plot.unit) button.append(element("small", "", fill(this.plot.unit, labels, c)));
     }
   }
 
-  switch(key, style, tone) {
+  switch(key, style, tone, series) {
     const button = element("button", style);
     button.type = "button";
-    button.style.setProperty("--tone", `var(--${tone})`);
+    button.append(swatch(style, `var(--${tone})`, series));
     button.setAttribute("aria-pressed", String(!this.hidden.has(key)));
     button.title = "Show or hide";
     button.addEventListener("click", () => {
@@ -325,6 +365,12 @@ function thin(samples, a, b, stride) {
 // What has no value is null to uPlot, which leaves a gap there.
 function holed(samples) {
   return samples.some(Number.isNaN) ? Array.from(samples, (value) => (Number.isNaN(value) ? null : value)) : samples;
+}
+
+// 1, 2 or 5 times a power of ten, no less than this.
+function roundStep(least) {
+  const power = 10 ** Math.floor(Math.log10(least));
+  return power * [1, 2, 5, 10].find((m) => m * power >= least * (1 - 1e-9));
 }
 
 function tick(value) {

@@ -10,6 +10,7 @@ import { Board } from "./plots/board.js";
 import { onViewChange, view, wirePreferences } from "./preferences.js";
 import { Session } from "./session.js";
 import { SolverRow } from "./solver.js";
+import { wireSplitters } from "./splitters.js";
 import { Stage } from "./stage.js";
 import { wireTips } from "./tips.js";
 import { toast } from "./toast.js";
@@ -189,6 +190,7 @@ document.getElementById("help").addEventListener("click", (event) => {
 });
 
 session.frame.addEventListener("load", () => tidyFrame(session.frame));
+wireSplitters();
 wirePreferences();
 wireMenus();
 wireTips(lab, (name) => knobs.values[name] ?? lab.params.find((p) => p.name === name).default);

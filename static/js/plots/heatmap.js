@@ -5,6 +5,7 @@ import { card } from "./card.js";
 import { fill } from "./labels.js";
 import { colour } from "./palette.js";
 
+const RIM = "#14171c";
 const EVERY = 250; // [ms] between redraws
 
 // The colours of values in the scene too (labs/colors.py), from the least to the largest.
@@ -70,31 +71,50 @@ export class HeatMap {
     const layout = {
       width: this.body.clientWidth, height: this.body.clientHeight,
       margin: { l: 4.5 * size, r: size, t: 0.75 * size, b: 3.6 * size },
-      paper_bgcolor: "transparent", plot_bgcolor: "transparent",
+      showlegend: false, paper_bgcolor: "transparent", plot_bgcolor: "transparent",
       font: { family: "system-ui, sans-serif", size, color: colour("axis") },
       xaxis: axis(xLabel), yaxis: axis(yLabel), uirevision: "keep",
     };
     Plotly.react(this.body, [trace, ...this.arrowTraces()], layout, { displayModeBar: false, doubleClick: "reset" });
   }
 
-  // Arrows as marks, white with a dark rim: they stand out on every colour of the map. As large as
-  // so many have room.
+  // The arrows, white with a dark rim: they stand out on every colour of the map. Each is as long as
+  // its neighbours leave room for; what leads nowhere is a dot.
   arrowTraces() {
     if (!this.arrows.length) return [];
-    const area = 0.5 * this.body.clientWidth * this.body.clientHeight;
-    const room = Math.min(20, Math.max(6, 0.6 * Math.sqrt(area / this.arrows.length)));
-    const lengths = this.arrows.map(([, , right, up]) => Math.hypot(right, up));
-    return [{
-      type: "scatter", mode: "markers", hoverinfo: "skip",
-      x: this.arrows.map(([at]) => at), y: this.arrows.map(([, at]) => at),
-      marker: {
-        symbol: lengths.map((length) => (length ? "arrow" : "circle")),
-        size: lengths.map((length) => (length ? room * (0.5 + 0.5 * length) : 5)),
-        angle: this.arrows.map(([, , right, up]) => (180 / Math.PI) * Math.atan2(right, up)),
-        color: "#ffffff", opacity: 1, line: { color: "#14171c", width: 1 },
+    const { clientWidth: width, clientHeight: height } = this.body;
+    const [stepX, stepY] = [0, 1].map((i) => spacing(this.arrows.map((arrow) => arrow[i])));
+    const lines = { x: [], y: [] };
+    for (const [x, y, right, up] of this.arrows) {
+      const [dx, dy] = [0.36 * stepX * right, 0.36 * stepY * up];
+      lines.x.push(x - dx, x + dx, null);
+      lines.y.push(y - dy, y + dy, null);
+    }
+    const extent = (values) => Math.abs(values.at(-1) - values[0]) || 1;
+    const ratio = (width * stepX * extent(this.data.y)) / (height * stepY * extent(this.data.x));
+    const leads = this.arrows.map(([, , right, up]) => right !== 0 || up !== 0);
+    const room = Math.min(9, 0.3 * Math.sqrt((0.5 * width * height) / this.arrows.length));
+    const traced = { type: "scatter", hoverinfo: "skip", ...lines, mode: "lines" };
+    return [
+      { ...traced, line: { color: RIM, width: 3.5 } },
+      { ...traced, line: { color: "#ffffff", width: 1.75 } },
+      {
+        type: "scatter", hoverinfo: "skip", mode: "markers",
+        x: this.arrows.map((_, i) => lines.x[3 * i + 1]), y: this.arrows.map((_, i) => lines.y[3 * i + 1]),
+        marker: {
+          symbol: leads.map((yes) => (yes ? "arrow" : "circle")), size: leads.map((yes) => (yes ? room : 4)),
+          angle: this.arrows.map(([, , right, up]) => (180 / Math.PI) * Math.atan2(right * ratio, up)),
+          color: "#ffffff", opacity: 1, line: { color: RIM, width: 0.75 },
+        },
       },
-    }];
+    ];
   }
 
   clear() {}
+}
+
+// The least distance of two places that differ.
+function spacing(places) {
+  const sorted = [...new Set(places)].sort((a, b) => a - b);
+  return sorted.length > 1 ? Math.min(...sorted.slice(1).map((place, i) => place - sorted[i])) : 1;
 }

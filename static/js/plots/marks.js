@@ -45,15 +45,15 @@ export function swatch(style, tone, series = 0) {
   return svg;
 }
 
-// Where the marks of a polyline of places [x, y] go: every so many pixels along it, a little later
-// for each series, so that those of near curves do not lie on one another.
+// Where the marks of a polyline of places [x, y] go: every so many pixels along it, counted
+// along x above all, a little later for each series, so that marks do not lie on one another.
 export function placesAlong(places, series, every = 90) {
   const found = [];
   let next = every * (0.25 + series / 11);
   let gone = 0;
   for (let i = 1; i < places.length && found.length < 40; i++) {
     const [[x0, y0], [x1, y1]] = [places[i - 1], places[i]];
-    const length = Math.hypot(x1 - x0, y1 - y0);
+    const length = Math.abs(x1 - x0) + 0.25 * Math.abs(y1 - y0);
     while (length > 0 && gone + length >= next && found.length < 40) {
       const part = (next - gone) / length;
       found.push([x0 + part * (x1 - x0), y0 + part * (y1 - y0)]);

@@ -4,7 +4,7 @@ import numpy as np
 
 from labs.tasks.pendulum_table.table import PendulumGrid
 
-ARROWS = 15
+ARROWS = 9
 """Along one side, at most."""
 
 

@@ -91,9 +91,10 @@ export class HeatMap {
       lines.y.push(y - dy, y + dy, null);
     }
     const extent = (values) => Math.abs(values.at(-1) - values[0]) || 1;
-    const ratio = (width * stepX * extent(this.data.y)) / (height * stepY * extent(this.data.x));
+    // In pixels, about: of the body, so much is the map's.
+    const [across, upward] = [(0.7 * width * stepX) / extent(this.data.x), (0.6 * height * stepY) / extent(this.data.y)];
     const leads = this.arrows.map(([, , right, up]) => right !== 0 || up !== 0);
-    const room = Math.min(9, 0.3 * Math.sqrt((0.5 * width * height) / this.arrows.length));
+    const room = Math.min(10, Math.max(6, 0.5 * Math.min(across, upward)));
     const traced = { type: "scatter", hoverinfo: "skip", ...lines, mode: "lines" };
     return [
       { ...traced, line: { color: RIM, width: 3.5 } },
@@ -103,7 +104,7 @@ export class HeatMap {
         x: this.arrows.map((_, i) => lines.x[3 * i + 1]), y: this.arrows.map((_, i) => lines.y[3 * i + 1]),
         marker: {
           symbol: leads.map((yes) => (yes ? "arrow" : "circle")), size: leads.map((yes) => (yes ? room : 4)),
-          angle: this.arrows.map(([, , right, up]) => (180 / Math.PI) * Math.atan2(right * ratio, up)),
+          angle: this.arrows.map(([, , right, up]) => (180 / Math.PI) * Math.atan2(right * across, up * upward)),
           color: "#ffffff", opacity: 1, line: { color: RIM, width: 0.75 },
         },
       },

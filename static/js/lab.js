@@ -10,6 +10,7 @@ import { Board } from "./plots/board.js";
 import { onViewChange, view, wirePreferences } from "./preferences.js";
 import { Session } from "./session.js";
 import { SolverRow } from "./solver.js";
+import { Sheets } from "./sheet.js";
 import { wireSplitters } from "./splitters.js";
 import { Stage } from "./stage.js";
 import { wireTips } from "./tips.js";
@@ -56,7 +57,7 @@ const actions = {
   clear: () => board.clear(),
   share: () => copy(new URL(link, location.href).href, "Link copied: it opens this lab with these parameters."),
   command: copyCommand,
-  full: () => fullScreen(),
+  full: () => stage.fullScreen(),
   help: () => document.getElementById("help").showModal(),
   experiment: (i) => experiments.start(i),
 };
@@ -76,11 +77,6 @@ async function copy(text, done) {
     // The clipboard needs a secure page; the text is then shown to be copied by hand.
     toast(text, 30);
   }
-}
-
-function fullScreen() {
-  if (document.fullscreenElement) document.exitFullscreen();
-  else document.getElementById("view").requestFullscreen?.();
 }
 
 function download(what) {
@@ -190,6 +186,7 @@ document.getElementById("help").addEventListener("click", (event) => {
 });
 
 session.frame.addEventListener("load", () => tidyFrame(session.frame));
+new Sheets();
 wireSplitters();
 wirePreferences();
 wireMenus();

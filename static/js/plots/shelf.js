@@ -83,6 +83,7 @@ export class Shelf {
       const place = shown.indexOf(plot);
       plot.section.hidden = place < 0;
       plot.section.style.order = place;
+      plot.section.classList.toggle("first", place === 0);
       this.tabs[i].hidden = !this.present.includes(plot);
       this.tabs[i].setAttribute("aria-pressed", String(place >= 0));
     });

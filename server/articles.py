@@ -186,6 +186,7 @@ class _Symbols:
 
     def __init__(self, params: type[Params]) -> None:
         named = {name: t for name, t in params.tunables.items() if t.symbol}
+        self.labels = {name: t.label for name, t in named.items()}
         self.names = {t.symbol.strip(): name for name, t in named.items()}
         # A bare letter inside a formula may be part of another symbol: those stay unmarked.
         structured = {_inner(tex(t.symbol)): name for name, t in named.items()}
@@ -195,7 +196,8 @@ class _Symbols:
         name = self.names.get(source.strip())
         if name is None:
             return self.mark(tex(source))
-        return f'<a class="symbol" href="#param-{name}" data-param="{name}">{tex(source)}</a>'
+        link = f'<a class="symbol" href="#param-{name}" data-param="{name}" aria-label='
+        return f'{link}"{escape(self.labels[name])}">{tex(source)}</a>'
 
     def mark(self, formula: str) -> str:
         for part, name in self.parts.items():

@@ -2,7 +2,7 @@
 // arrow keys; a double click or Enter puts one back. Where they are is kept in this browser, as
 // parts of the window. The style sheet keeps every part of the page wide and high enough to use.
 
-import { recall, remember } from "./memory.js";
+import { storeData, storedData } from "./store.js";
 
 const KEY = "layout";
 const STEP = 0.02;
@@ -16,7 +16,7 @@ const BORDERS = {
 
 export function wireSplitters() {
   const desk = document.querySelector(".desk");
-  const kept = recall(KEY) ?? {};
+  const kept = storedData(KEY, {});
   for (const splitter of desk.querySelectorAll("[role=separator]")) {
     new Splitter(splitter, desk, kept);
   }
@@ -51,7 +51,7 @@ class Splitter {
   }
 
   keep() {
-    remember(KEY, this.kept);
+    storeData(KEY, this.kept);
   }
 
   reset() {

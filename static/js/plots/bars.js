@@ -1,7 +1,9 @@
 // One bar a component, the limit each must stay within, and marks to compare with.
 
+import { number } from "../format.js";
 import { card } from "./card.js";
 import { around, Chart } from "./chart.js";
+import { sentences } from "./summary.js";
 import { symbol } from "./symbol.js";
 
 export class Bars {
@@ -42,6 +44,12 @@ export class Bars {
     this.limits.forEach((limit, i) => {
       for (const edge of [limit, -limit]) chart.line([i + 0.6, edge], [i + 1.4, edge], "limit");
     });
+  }
+
+  summary() {
+    if (!this.values) return "";
+    const parts = this.values.map((value, i) => `${this.names?.[i] ?? i + 1}: ${number(value, 3)}`);
+    return sentences(`${this.plot.title}, bars${this.plot.unit ? ` in ${this.plot.unit}` : ""}`, parts);
   }
 
   clear() {

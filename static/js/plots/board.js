@@ -12,8 +12,10 @@ import { Note } from "./note.js";
 import { forgetColours } from "./palette.js";
 import { Readouts } from "./readouts.js";
 import { Shelf } from "./shelf.js";
+import { summarise } from "./summary.js";
 import { TimeSeries } from "./timeseries.js";
 
+const WORDS_EVERY = 2000; // [ms]
 const KINDS = { TimeSeries, Curves, Bars, Matrix, HeatMap, Note };
 
 export class Board {
@@ -32,6 +34,7 @@ export class Board {
     this.shelf = new Shelf(lab.slug, this.plots, () => this.refresh());
     this.series = this.plots.filter((plot) => plot instanceof TimeSeries);
     this.pictured = this.plots.filter((plot) => plot.update);
+    setInterval(() => summarise(this.shelf.shown), WORDS_EVERY);
     this.unzoomButton = document.getElementById("unzoom");
     this.unzoomButton?.addEventListener("click", () => this.unzoom());
     const select = document.getElementById("window");

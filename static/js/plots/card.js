@@ -12,6 +12,10 @@ export function card(title, unit = "", bodyClass = "canvas") {
   header.append(heading, legend);
   const body = element("div", bodyClass);
   section.setAttribute("aria-label", title);
+  if (bodyClass.startsWith("canvas") && !bodyClass.endsWith("note")) {
+    body.setAttribute("role", "img"); // in words: summary.js
+    body.setAttribute("aria-label", title);
+  }
   section.append(header, body);
   return { section, setUnit, legend, body };
 }

@@ -6,7 +6,7 @@ const SVG = "http://www.w3.org/2000/svg";
 export class Chart {
   constructor(body, draw) {
     this.body = body;
-    this.svg = svg("svg", { class: "chart", role: "img" });
+    this.svg = svg("svg", { class: "chart", "aria-hidden": "true" });
     body.append(this.svg);
     new ResizeObserver(draw).observe(body);
   }

@@ -6,6 +6,7 @@ import { card, element } from "./card.js";
 import { around, Chart } from "./chart.js";
 import { fill } from "./labels.js";
 import { outline, placesAlong, swatch } from "./marks.js";
+import { extent, sentences } from "./summary.js";
 
 const SERIES = 8;
 
@@ -123,6 +124,15 @@ export class Curves {
       const at = `translate(${x.toFixed(1)} ${y.toFixed(1)}) scale(${size})`;
       chart.add("path", { d: outline(series), transform: at, class: "point tone", style: colour });
     }
+  }
+
+  summary() {
+    if (!this.curves) return "";
+    const value = (v) => (this.plot.log_y ? 10 ** v : v);
+    const there = this.curves.filter(({ points }) => points.length);
+    const parts = there.map(({ label, points }) =>
+      `${label || "points"}: ${points.length} points, ${extent(points.map(([, y]) => value(y)))}`);
+    return sentences(`${this.plot.title}: ${this.yLabel || "values"} over ${this.xLabel}`, parts);
   }
 
   clear() {

@@ -4,6 +4,7 @@
 import { card } from "./card.js";
 import { fill } from "./labels.js";
 import { colour } from "./palette.js";
+import { extent, sentences } from "./summary.js";
 
 const RIM = "#14171c";
 const EVERY = 250; // [ms] between redraws
@@ -109,6 +110,15 @@ export class HeatMap {
         },
       },
     ];
+  }
+
+  summary() {
+    if (!this.data) return "";
+    const [xLabel, yLabel, zLabel] = this.labels;
+    const { x, y, z } = this.data;
+    const parts = [`${zLabel} ${extent(z.flat()).replace(/, last.*/, "")}`, `${x.length} columns and ${y.length} rows`];
+    if (this.plot.arrows) parts.push(`${this.arrows.length} arrows`);
+    return sentences(`${this.plot.title}: a map over ${xLabel} and ${yLabel}`, parts);
   }
 
   clear() {}

@@ -2,7 +2,7 @@
 // one that was pinned first makes room, unless an experiment watches it. What the reader pins is
 // kept in this browser.
 
-import { recall, remember } from "../memory.js";
+import { storeData, storedData } from "../store.js";
 import { element } from "./card.js";
 
 export class Shelf {
@@ -11,7 +11,7 @@ export class Shelf {
     this.plots = this.present = plots; // all, and those that mean something now
     this.changed = changed;
     this.watched = [];
-    const kept = recall(this.key) ?? {};
+    const kept = storedData(this.key, {});
     this.room = kept.room === 4 ? 4 : 2;
     const known = plots.filter(({ plot }) => kept.pinned?.includes(plot.title));
     this.pinned = known.length ? known : plots;
@@ -74,7 +74,7 @@ export class Shelf {
   }
 
   keep() {
-    remember(this.key, { room: this.room, pinned: this.shown.map(({ plot }) => plot.title) });
+    storeData(this.key, { room: this.room, pinned: this.shown.map(({ plot }) => plot.title) });
   }
 
   show() {

@@ -4,8 +4,10 @@
 import { number } from "../format.js";
 import { card, element } from "./card.js";
 import { fill } from "./labels.js";
-import { DASHES, drawMark, swatch } from "./marks.js";
+import { markCurves } from "./marking.js";
+import { DASHES, swatch } from "./marks.js";
 import { colour, SERIES } from "./palette.js";
+import { extent, sentences } from "./summary.js";
 import { symbol } from "./symbol.js";
 
 const DENSITY = 3; // samples a pixel that are worth drawing
@@ -93,7 +95,7 @@ export class TimeSeries {
       series: [{}, ...this.curves.map((curve) => this.series(curve))],
       hooks: {
         drawAxes: [(u) => this.drawAreas(u), (u) => this.drawGhost(u)],
-        draw: [(u) => this.drawMarks(u)],
+        draw: [(u) => markCurves(this, u)],
         setSelect: [(u) => this.zoom(u)],
         setCursor: [() => this.readOut(true)],
       },
@@ -239,27 +241,6 @@ export class TimeSeries {
     ctx.restore();
   }
 
-  // A mark on each curve every so often, at times of its own: they move with the curves.
-  drawMarks(u) {
-    const [t, ...all] = u.data;
-    if (!this.marked || t.length < 2) return;
-    const every = roundStep((u.scales.x.max - u.scales.x.min) / 6);
-    const rim = colour("surface");
-    this.curves.forEach(({ series, tone, line }, i) => {
-      if (!series || !u.series[i + 1].show || this.isArea(line)) return;
-      u.ctx.fillStyle = colour(tone);
-      let k = Math.ceil(t[0] / every - series / 9);
-      for (let time = every * (k + series / 9); time <= t[t.length - 1]; time = every * (++k + series / 9)) {
-        const at = u.valToIdx(time);
-        const value = all[i][at];
-        const [x, y] = [u.valToPos(t[at], "x", true), u.valToPos(value, "y", true)];
-        const { left, top, width, height } = u.bbox;
-        const within = x > left && x < left + width && y > top && y < top + height;
-        if (Number.isFinite(value) && within) drawMark(u.ctx, series, x, y, rim);
-      }
-    });
-  }
-
   zoom(u) {
     const { left, width } = u.select;
     if (width < 4) return;
@@ -344,6 +325,17 @@ export class TimeSeries {
     this.box.style.insetInline = right ? "0.25rem auto" : "auto 0.25rem";
   }
 
+  summary() {
+    const [t, ...all] = this.uplot?.data ?? [[]];
+    if (!t.length) return `${this.plot.title}: no curves yet.`;
+    const names = this.board.labels[this.plot.select];
+    const parts = this.curves.map(({ line, c }, i) => {
+      const which = this.components > 1 && c !== null ? `, ${this.plot.select} ${names?.[c] ?? c + 1}` : "";
+      return `${symbol(line.mathml).textContent}${which}: ${extent(all[i])} ${fill(this.plot.unit, this.board.labels, c)}`.trimEnd();
+    });
+    return sentences(`${this.plot.title} over time, ${number(t[0], 3)} s to ${number(t[t.length - 1], 3)} s`, parts);
+  }
+
   resize() {
     const { clientWidth: width, clientHeight: height } = this.body;
     if (!width) return;
@@ -365,12 +357,6 @@ function thin(samples, a, b, stride) {
 // What has no value is null to uPlot, which leaves a gap there.
 function holed(samples) {
   return samples.some(Number.isNaN) ? Array.from(samples, (value) => (Number.isNaN(value) ? null : value)) : samples;
-}
-
-// 1, 2 or 5 times a power of ten, no less than this.
-function roundStep(least) {
-  const power = 10 ** Math.floor(Math.log10(least));
-  return power * [1, 2, 5, 10].find((m) => m * power >= least * (1 - 1e-9));
 }
 
 function tick(value) {

@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 
 from tests.browser.lab_page import LabPage
 
-SWAGGER = "#swagger-ui"  # not ours to mend
+SWAGGER = "#docs"  # not ours to mend
 
 
 def found(page: Page) -> list[str]:
@@ -29,6 +29,7 @@ def test_the_pages(page: Page, scheme: Literal["light", "dark"]) -> None:
     page.set_viewport_size({"width": 1366, "height": 650})
     for path in ("/", "/docs"):
         page.goto(path)
+        page.wait_for_load_state("networkidle")
         assert found(page) == [], path
     lab = LabPage(page, scene=False).open("markov")
     bars = lab.pin("Distribution now, and in the long run").get_by_role("img")

@@ -156,6 +156,12 @@ class Lab(abc.ABC, Generic[P, S]):
         """Sentences for `Note` plots, asked for with the fields. No name is a field's, too."""
         return {}
 
+    def labels(self, params: P) -> Mapping[str, str | tuple[str, ...]]:
+        """Words of the plots (labs/plots.py) that depend on the parameters, such as a unit or the
+        names of states; a tuple has one for each component, curve, bar or row. No name is a
+        field's or a note's, too."""
+        return {}
+
     @abc.abstractmethod
     def draw(self, scene: Scene, params: P, state: S) -> None:
         """Draws one frame."""

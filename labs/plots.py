@@ -1,9 +1,20 @@
 """What a lab may plot. A plot names channels: keys of what the lab's `measure` (recorded over
-time) or `fields` (asked for a few times a second) returns. Symbols are TeX, units SI."""
+time) or `fields` (asked for a few times a second) returns. Symbols are TeX, units SI.
 
-from dataclasses import asdict, dataclass
+In a unit, an axis or the label of a curve, `{name}` stands for what `Lab.labels` says under the
+present parameters. A plot with `when`, such as `when={"world": ("pendulum",)}`, is there only
+while each of these parameters has one of its values."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from types import MappingProxyType
 from typing import Any, Literal
 
+from labs.params import Value
+
+When = Mapping[str, tuple[Value, ...]]
+ALWAYS: When = MappingProxyType({})
 Guide = Literal["none", "imaginary-axis", "left-half-plane", "unit-circle"]
 
 
@@ -19,7 +30,8 @@ class Line:
 @dataclass(frozen=True, init=False)
 class TimeSeries:
     """Measured channels over time: `TimeSeries("Error", "rad", Line("error", "e"))`. `select` names
-    what a vector's components are ("joint"). `stacked` lays the solid lines of one component on
+    what a vector's components are ("joint"); what `Lab.labels` says under it are their names. A
+    unit in braces may be one for each of them. `stacked` lays the solid lines of one component on
     top of one another as areas, what is negative below zero; while all are chosen, those of
     component `lead`."""
 
@@ -29,6 +41,7 @@ class TimeSeries:
     select: str
     stacked: bool
     lead: int
+    when: When
 
     def __init__(
         self,
@@ -38,8 +51,10 @@ class TimeSeries:
         select: str = "",
         stacked: bool = False,
         lead: int = 0,
+        when: When = ALWAYS,
     ) -> None:
         _set(self, title=title, unit=unit, lines=lines, select=select, stacked=stacked, lead=lead)
+        _set(self, when=when)
 
 
 @dataclass(frozen=True)
@@ -54,7 +69,8 @@ class Trace:
     x: str
     y: str
     label: str | tuple[str, ...] = ""
-    """Of k curves a name each, or one name in which {} stands for the number of the curve."""
+    """Of k curves a name each, or one name in which {} stands for the number of the curve, or
+    {name} for a word of each."""
     style: Literal["line", "marked", "points", "dash"] = "line"
     series: int = 0
     note: str = ""
@@ -74,6 +90,7 @@ class Curves:
     log_y: bool
     guide: Guide
     equal: bool
+    when: When
 
     def __init__(
         self,
@@ -85,15 +102,19 @@ class Curves:
         log_y: bool = False,
         guide: Guide = "none",
         equal: bool = False,
+        when: When = ALWAYS,
     ) -> None:
         labels = {"title": title, "x_label": x_label, "y_label": y_label}
         _set(self, **labels, traces=traces, log_x=log_x, log_y=log_y, guide=guide, equal=equal)
+        _set(self, when=when)
 
 
 @dataclass(frozen=True)
 class HeatMap:
     """A 2-D field z over 1-D fields x (columns) and y (rows). With `gaps` z may be NaN where
-    there is no value: the cell stays empty."""
+    there is no value: the cell stays empty. `arrows` names a field (k, 4) of arrows over it, such
+    as a policy: x and y of the middle on the axes, then the way right and up on the screen, at
+    most 1 long; (0, 0) is a dot."""
 
     title: str
     x: str
@@ -103,25 +124,30 @@ class HeatMap:
     y_label: str
     z_label: str
     gaps: bool = False
+    arrows: str = ""
+    when: When = field(default_factory=dict, kw_only=True)
 
 
 @dataclass(frozen=True)
 class Matrix:
     """A small 2-D field written out in digits. `shade` also colours each cell by its value
-    relative to the largest magnitude: a heat map one can read."""
+    relative to the largest magnitude: a heat map one can read. What `Lab.labels` says under
+    `rows` are the names of its rows."""
 
     title: str
     field: str
     symbol: str
     unit: str = ""
     shade: bool = False
+    rows: str = ""
 
 
 @dataclass(frozen=True)
 class Bars:
     """A 1-D field as bars, with the limit (a 1-D field) each must stay within, and with marks (a
     1-D field, which may be empty) across the bars where each ought to end. With `gaps` bars and
-    marks may be NaN where there is no value: they are left out."""
+    marks may be NaN where there is no value: they are left out. What `Lab.labels` says under
+    `names` are the names of the bars, else they have numbers."""
 
     title: str
     field: str
@@ -130,6 +156,7 @@ class Bars:
     limit: str = ""
     marks: str = ""
     gaps: bool = False
+    names: str = ""
 
 
 @dataclass(frozen=True)
@@ -141,6 +168,7 @@ class Readout:
     label: str
     unit: str
     whole: bool = False
+    when: When = field(default_factory=dict, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -167,14 +195,32 @@ def field_names(plot: Plot) -> tuple[str, ...]:
         case Curves(traces=traces):
             named = (name for trace in traces for name in (trace.x, trace.y, trace.note))
             return tuple(name for name in named if name)
-        case HeatMap(x=x, y=y, z=z):
-            return (x, y, z)
+        case HeatMap(x=x, y=y, z=z, arrows=arrows):
+            return (x, y, z, arrows) if arrows else (x, y, z)
         case Matrix(field=field):
             return (field,)
         case Bars(field=field, limit=limit, marks=marks):
             return tuple(name for name in (field, limit, marks) if name)
         case Note(note=note):
             return (note,)
+        case _:
+            return ()
+
+
+def label_names(plot: Plot) -> tuple[str, ...]:
+    """The names of `Lab.labels` a plot may show."""
+    match plot:
+        case TimeSeries(unit=unit, select=select):
+            return _words(unit) + ((select,) if select else ())
+        case Curves(x_label=x_label, y_label=y_label, traces=traces):
+            labels = [trace.label for trace in traces if isinstance(trace.label, str)]
+            return _words(x_label, y_label, *labels)
+        case HeatMap(x_label=x_label, y_label=y_label, z_label=z_label):
+            return _words(x_label, y_label, z_label)
+        case Readout(label=label, unit=unit):
+            return _words(label, unit)
+        case Matrix(rows=names) | Bars(names=names):
+            return (names,) if names else ()
         case _:
             return ()
 
@@ -194,7 +240,18 @@ def fields_with_gaps(plot: Plot) -> tuple[str, ...]:
 
 def describe(plot: Plot) -> dict[str, Any]:
     """A plot as plain JSON data; `kind` tells which."""
-    return {"kind": type(plot).__name__} | asdict(plot)
+    data = {"kind": type(plot).__name__} | {f.name: getattr(plot, f.name) for f in fields(plot)}
+    for name in ("lines", "traces"):
+        if name in data:
+            data[name] = [asdict(part) for part in data[name]]
+    if "when" in data:
+        data["when"] = dict(data["when"])
+    return data
+
+
+def _words(*texts: str) -> tuple[str, ...]:
+    """The names that stand in braces."""
+    return tuple(name for text in texts for name in re.findall(r"\{(\w+)\}", text))
 
 
 def _set(plot: Any, **values: Any) -> None:

@@ -1,5 +1,5 @@
-"""Articles: a lab's Markdown to HTML, with the mathematics as MathML, drawings (SVG files beside the
-article) and experiments as cards."""
+"""Articles: a lab's Markdown to HTML, with the mathematics as MathML, drawings (SVG files beside
+the article) and experiments as cards."""
 
 import re
 from collections.abc import Sequence
@@ -20,6 +20,7 @@ from labs.params import Params
 from server import experiments
 from server.experiments import Experiment
 from server.formulas import ArticleError, tex
+from server.line_breaks import statements
 
 
 @dataclass(frozen=True)
@@ -78,8 +79,11 @@ class _Writer:
         return self.symbols.inline(tokens[i].content)
 
     def _display(self, tokens: Sequence[Token], i: int, *_: Any) -> str:
-        formula = self.symbols.mark(tex(tokens[i].content.strip(), True))
-        return f'<div class="formula">{formula}</div>\n'
+        """In pieces, between which a narrow column breaks the line."""
+        source = tokens[i].content
+        lines = [[tex(piece, True) for piece in pieces] for pieces in statements(source)]
+        spans = [f"<span>{self.symbols.mark('<wbr>'.join(pieces))}</span>" for pieces in lines]
+        return f'<div class="formula">{" ".join(spans)}</div>\n'
 
     def _table_open(self, *_: Any) -> str:
         return '<div class="table"><table>\n'
@@ -123,6 +127,7 @@ class _Symbols:
 
     def __init__(self, params: type[Params]) -> None:
         named = {name: t for name, t in params.tunables.items() if t.symbol}
+        self.labels = {name: t.label for name, t in named.items()}
         self.names = {t.symbol.strip(): name for name, t in named.items()}
         # A bare letter inside a formula may be part of another symbol: those stay unmarked.
         structured = {_inner(tex(t.symbol)): name for name, t in named.items()}
@@ -133,7 +138,11 @@ class _Symbols:
         if name is None:
             return self.mark(tex(source))
         shown = tex(source)
-        return f'<span class="symbol" role="button" tabindex="0" data-param="{name}">{shown}</span>'
+        label = escape(self.labels[name])
+        return (
+            f'<span class="symbol" role="button" tabindex="0" data-param="{name}"'
+            f' aria-label="{label}">{shown}</span>'
+        )
 
     def mark(self, formula: str) -> str:
         for part, name in self.parts.items():

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from labs.engine.run import World
-from labs.plots import field_names
+from labs.plots import field_names, label_names
 from server.messages import Hello, Status, Telemetry, View
 from server.pacing import MEASURE_EVERY, Pacer
 from server.pipe import HELLO, STATUS, STREAM, Link
@@ -53,7 +53,8 @@ class Broadcast:
         self._link, self._scene, self._controls = link, scene, controls
         self._pacer, self._solver = pacer, solver
         self._world = world = controls.world
-        self._fields = sorted({name for plot in world.lab.plots for name in field_names(plot)})
+        shown = (field_names(plot) + label_names(plot) for plot in world.lab.plots)
+        self._fields = sorted({name for names in shown for name in names})
         self._due = dict.fromkeys(("scene", "telemetry", "fields", "status"), 0.0)
         self._sent_run = 0
         self._sent_rows = 0
@@ -145,9 +146,10 @@ class Broadcast:
         fields = None
         wanted = controls.viewers and self._fields and not controls.failure
         if wanted and self._is_due("fields", now, FIELDS):
-            known: dict[str, np.ndarray | str] = {
+            known: dict[str, np.ndarray | str | tuple[str, ...]] = {
                 **world.lab.fields(world.params, world.state),
                 **world.lab.notes(world.params, world.state),
+                **world.lab.labels(world.params),
             }
             fields = {name: known[name] for name in self._fields if name in known}
         now_row = None if len(rows) else self._current_row()

@@ -127,8 +127,8 @@ class Telemetry:
     now: np.ndarray | None = None
     """(columns,): the state as it is, where it changed since the last sample without time going
     on."""
-    fields: Mapping[str, np.ndarray | str] | None = None
-    """Arrays for curves, heat maps, matrices and bars, and notes, a few times a second."""
+    fields: Mapping[str, np.ndarray | str | tuple[str, ...]] | None = None
+    """Arrays for curves, heat maps, matrices and bars, notes and labels, a few times a second."""
     type: Literal["telemetry"] = "telemetry"
 
 

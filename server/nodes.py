@@ -14,7 +14,7 @@ from server.messages import View
 COLORS: dict[Color, tuple[int, int, int]] = {
     "actual": (37, 99, 235),
     "reference": (234, 128, 28),
-    "force": (200, 30, 110),
+    "force": (190, 24, 130),
     "warning": (220, 38, 38),
     "muted": (140, 152, 168),
 }

@@ -10,6 +10,8 @@ import { Board } from "./plots/board.js";
 import { onViewChange, view, wirePreferences } from "./preferences.js";
 import { Session } from "./session.js";
 import { SolverRow } from "./solver.js";
+import { Sheets } from "./sheet.js";
+import { wireSplitters } from "./splitters.js";
 import { Stage } from "./stage.js";
 import { Symbols } from "./symbols.js";
 import { toast } from "./toast.js";
@@ -57,7 +59,7 @@ const actions = {
   clear: () => board.clear(),
   share: () => copy(new URL(link, location.href).href, "Link copied: it opens this lab with these parameters."),
   command: copyCommand,
-  full: () => fullScreen(),
+  full: () => stage.fullScreen(),
   help: () => document.getElementById("help").showModal(),
   experiment: (i) => experiments.start(i),
 };
@@ -77,11 +79,6 @@ async function copy(text, done) {
     // The clipboard needs a secure page; the text is then shown to be copied by hand.
     toast(text, 30);
   }
-}
-
-function fullScreen() {
-  if (document.fullscreenElement) document.exitFullscreen();
-  else document.getElementById("view").requestFullscreen?.();
 }
 
 function download(what) {
@@ -149,6 +146,7 @@ session.addEventListener("status", ({ detail: status }) => {
   knobs.show(status.params);
   column.show();
   symbols.show();
+  board.choose(status.params);
   link = linkOf(lab.params, status.params, status.seed);
   writeLink(link);
   if (status.trouble) {
@@ -193,6 +191,8 @@ document.getElementById("help").addEventListener("click", (event) => {
   if (event.target === event.currentTarget) event.currentTarget.close();
 });
 
+new Sheets();
+wireSplitters();
 wirePreferences();
 wireMenus();
 wireKeyboard(actions);

@@ -31,6 +31,12 @@ export class Stage {
     this.curtain.querySelector(".progress").classList.toggle("held", yes);
   }
 
+  // The scene with its controls and one plot on the whole screen, and back.
+  fullScreen() {
+    if (document.fullscreenElement) document.exitFullscreen();
+    else document.getElementById("stage").requestFullscreen?.();
+  }
+
   // A sentence with buttons {label: action}. Saying nothing takes the banner away.
   say(text, { warn = false, buttons = {} } = {}) {
     if (text === this.said) return;

@@ -11,6 +11,9 @@ from server.articles import render
 from tests.browser.conftest import screenshot
 from tests.browser.lab_page import LabPage, wait_frames
 
+CUT = """() => [...document.querySelectorAll(".formula")]
+  .filter(formula => formula.scrollWidth > formula.clientWidth + 1)
+  .map(formula => formula.textContent)"""
 SHIPPED = [entry for entry in catalog().values() if entry.package.startswith("labs.")]
 
 KNOBS = ".knob.set:not([hidden])"
@@ -26,6 +29,7 @@ def test_every_experiment_and_a_slider_set_what_they_say(page: Page, entry: Entr
     # Pressing is the page's own; drawing every scene in software would take minutes.
     page.set_viewport_size({"width": 1366, "height": 650})  # a laptop's screen, less its bars
     lab = LabPage(page, scene=False).open(entry.slug)
+    assert page.evaluate(CUT) == [], "formulas break where the column is too narrow"
     for number, experiment in enumerate(render(entry).experiments):
         page.locator(".experiment .try").nth(number).click()
         expect(page.locator(".experiment").nth(number)).to_have_class(re.compile("current"))

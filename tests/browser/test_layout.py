@@ -48,6 +48,83 @@ def test_knobs_robot_and_plots_are_in_view_together(page: Page, width: int, heig
         screenshot(page, f"{slug}-{width}")
 
 
+def test_what_the_reader_arranges_is_kept(page: Page) -> None:
+    page.set_viewport_size({"width": 1440, "height": 790})
+    lab = LabPage(page, scene=False).open("joint-control")
+    page.get_by_role("button", name="Four plots").click()
+    expect(page.locator("#plots > :not([hidden])")).to_have_count(4)
+    lab.pin("Closed-loop eigenvalues")
+    border = page.get_by_role("separator", name="Width of the article")
+    before = page.locator("#article").bounding_box()
+    box = border.bounding_box()
+    assert box
+    assert before
+    page.mouse.move(box["x"] + 4, 300)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 84, 300, steps=3)
+    page.mouse.up()
+    page.get_by_role("separator", name="Height of the scene").press("End")
+    page.reload()
+    lab.wait_live()
+    after = page.locator("#article").bounding_box()
+    assert after
+    assert after["width"] == pytest.approx(before["width"] + 80, abs=3)
+    expect(page.locator("#plots > :not([hidden])")).to_have_count(4)
+    expect(page.get_by_role("region", name="Closed-loop eigenvalues")).to_be_visible()
+    for name in ("article", "knobs"):  # however far they are moved, nothing is lost
+        page.locator(f"[data-border={name}]").press("End")
+    wait_frames(page)
+    for part in ("#view", "#transport", "#tiles", "#plots", "#shelf"):
+        assert lab.whole(part), part
+    border.dblclick()
+    wait_frames(page)
+    again = page.locator("#article").bounding_box()
+    assert again
+    assert again["width"] == pytest.approx(before["width"], abs=1)
+
+
+@pytest.mark.parametrize(("width", "height"), [(768, 1024), (1024, 768)])
+def test_a_tablet_has_all_parts_in_view(page: Page, width: int, height: int) -> None:
+    page.set_viewport_size({"width": width, "height": height})
+    lab = LabPage(page, scene=False).open("lqr")
+    page.locator(".experiment .try").nth(1).click()
+    expect(page.locator(".experiment.current")).to_be_visible()
+    wait_frames(page)
+    for part in ("#view", "#transport", ".plot.watched", ".current .observe", "#param-deviation"):
+        assert lab.whole(part), part
+    screenshot(page, f"lqr-{width}")
+
+
+def test_on_a_phone_the_card_holds_its_knobs_and_its_plot(page: Page) -> None:
+    page.set_viewport_size({"width": 390, "height": 844})
+    lab = LabPage(page, scene=False).open("lqr")
+    button = page.locator(".experiment .try").nth(1)
+    button.scroll_into_view_if_needed()
+    card = page.locator(".experiment").nth(1)
+    top = "card => card.getBoundingClientRect().top"
+    before = card.evaluate(top)
+    button.click()
+    own = card.locator(".own")
+    expect(own.locator(".knob.set")).to_have_count(2)
+    expect(own.get_by_role("region", name="Cost", exact=True)).to_be_visible()
+    wait_frames(page)
+    assert abs(card.evaluate(top) - before) < 844, "nobody is thrown far"
+    for part in ("#view", "#run", "[data-sheet=knobs]"):
+        assert lab.whole(part), part
+    page.get_by_role("button", name="Knobs").click()
+    expect(lab.value("horizon")).to_be_visible()
+    scene, sheet = (page.locator(part).bounding_box() for part in ("#view", "#knobs"))
+    assert scene
+    assert sheet
+    assert sheet["y"] >= scene["y"] + scene["height"] - 1, "the robot stays in view"
+    screenshot(page, "lqr-phone")
+    page.keyboard.press("Escape")
+    expect(page.locator("#knobs")).to_be_hidden()
+    page.set_viewport_size({"width": 1366, "height": 650})  # all goes back where it belongs
+    expect(page.locator("#knobs .knob.set")).to_have_count(2)
+    expect(page.locator("#plots > .watched")).to_be_visible()
+
+
 def lightness(page: Page) -> int:
     """Of the page's background: red + green + blue."""
     color = page.evaluate("getComputedStyle(document.documentElement).backgroundColor")

@@ -272,10 +272,16 @@ def test_plots_name_real_channels(entry: Entry) -> None:
     measured = lab.measure(world.params, world.state)
     pictured = lab.fields(world.params, world.state)
     noted = lab.notes(world.params, world.state)
-    assert not set(noted) & set(pictured)
+    said = lab.labels(world.params)
+    assert len({*noted, *pictured, *said}) == len(noted) + len(pictured) + len(said)
     for plot in lab.plots:
         known = noted if isinstance(plot, Note) else pictured
         assert set(plots.field_names(plot)) <= set(known), plot
+        assert set(plots.label_names(plot)) <= {*said, getattr(plot, "select", "")}, plot
+        for governor, values in getattr(plot, "when", {}).items():
+            tunable = lab.Params.tunables[governor]
+            assert isinstance(tunable, Choice), plot
+            assert set(values) < set(tunable.options), f"{plot}: some of its options"
         match plot:
             case TimeSeries(unit=unit, lines=lines, select=select):
                 assert lines, plot
@@ -298,15 +304,19 @@ def test_plots_name_real_channels(entry: Entry) -> None:
                     if isinstance(trace.label, tuple):
                         assert y.shape[1:] == (len(trace.label),), trace
                     elif y.ndim == 2:
-                        assert "{}" in trace.label or not trace.label, trace
+                        assert "{" in trace.label or not trace.label, trace
                     if trace.note:
                         assert len(pictured[trace.note]) in {0, *(y.shape[1:] or (1,))}, trace
                 labels = [name for trace in traces for name in named(trace)]
                 assert labels or len(traces) == 1, f"{plot}: a legend names what is drawn"
                 assert len(labels) == len(set(labels)), plot
                 assert not (equal and (log_x or log_y)), f"{plot}: one scale is linear"
-            case HeatMap(x=x, y=y, z=z):
+            case HeatMap(x=x, y=y, z=z, arrows=arrows):
                 assert np.shape(pictured[z]) == (len(pictured[y]), len(pictured[x]))
+                if arrows:
+                    ways = np.asarray(pictured[arrows])
+                    assert ways.shape == (len(ways), 4), plot
+                    assert np.linalg.norm(ways[:, 2:], axis=1).max(initial=0.0) <= 1.0 + 1e-9
             case Matrix(field=name, symbol=symbol):
                 assert np.ndim(pictured[name]) == 2
                 tex(symbol)
@@ -320,6 +330,32 @@ def test_plots_name_real_channels(entry: Entry) -> None:
             case Readout(channel=channel, label=label):
                 assert label
                 assert np.ndim(measured.get(channel, 0.0)) == 0, "a read-out is one number"
+
+
+@every_lab
+def test_labels_fit_what_they_name_whatever_is_chosen(entry: Entry) -> None:
+    """As many names as components, bars and rows, and one unit for each; never two systems'."""
+    lab = entry.lab
+    for changes in variants(entry):
+        world = World(entry, changes)
+        said = lab.labels(world.params)
+        counts = {name: len(said[name]) for name in said if not isinstance(said[name], str)}
+        measured = lab.measure(world.params, world.state)
+        pictured = lab.fields(world.params, world.state)
+        for plot in lab.plots:
+            sizes: set[int] = set()
+            if isinstance(plot, TimeSeries) and plot.select:
+                shapes = [np.shape(measured[line.channel]) for line in plot.lines]
+                sizes = {shape[0] for shape in shapes if shape}
+            elif isinstance(plot, Bars | Matrix):
+                sizes = {len(pictured[plot.field])}
+            for name in plots.label_names(plot):
+                if name in counts and not isinstance(plot, Curves):
+                    assert sizes == {counts[name]}, (plot, changes)
+        for words in said.values():
+            for word in [words] if isinstance(words, str) else words:
+                assert ";" not in word, (words, changes)
+                assert word == word.strip(), (words, changes)
 
 
 def named(trace: Trace) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ import pytest
 from labs.engine.catalog import Entry, catalog, find
 from server.articles import Article, render, render_text, words
 from server.formulas import ArticleError, tex
+from server.line_breaks import statements
 
 COURSE = [entry for entry in catalog().values() if entry.package.startswith("labs.")]
 EXPERIMENT = """```experiment
@@ -45,6 +46,24 @@ def test_formulas_become_mathml(entry: Entry) -> None:
     html = write(entry, "Inline $x^2$ and\n\n$$\\frac{a}{b}$$\n").html
     assert "<math><msup>" in html
     assert '<math display="block"><mfrac>' in html
+
+
+@pytest.mark.parametrize(
+    ("source", "pieces"),
+    [
+        (r"a = b + c \quad d \le -e", [["a", "{}= b", "{}+ c"], ["d", r"{}\le -e"]]),
+        (
+            r"f\left(a = b\right) - |c + d| = e^+",
+            [[r"f\left(a = b\right)", "{}- |c + d|", "{}= e^+"]],
+        ),
+        (
+            r"\begin{cases} a & b = c \\ d \end{cases}",
+            [[r"\begin{cases} a & b = c \\ d \end{cases}"]],
+        ),
+    ],
+)
+def test_a_formula_breaks_between_its_terms_alone(source: str, pieces: list[list[str]]) -> None:
+    assert statements(source) == pieces
 
 
 def test_bad_tex_names_the_article_and_the_formula(entry: Entry) -> None:

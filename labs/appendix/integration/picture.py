@@ -8,9 +8,9 @@ from labs.scene import Scene
 
 COLORS = tuple(
     tuple(int(code[i : i + 2], 16) / 255 for i in (0, 2, 4))
-    for code in ["0068ad", "cf5300", "00875f", "b5518f", "a57c00", "5a5fd0", "8b9097", "1391a6"]
+    for code in ["215694", "b54300", "578e55", "be5791", "b7931f", "5b5fd0", "959a99", "0097c1"]
 )
-"""Of the plots' eight lines."""
+"""Close to those of the plots' eight lines, and seen on white and on dark."""
 SPACING = (-0.04, 0.36, 0.0)
 """[m] from the hinge of one pendulum to the next: behind and beside it."""
 

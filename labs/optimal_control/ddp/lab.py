@@ -10,6 +10,7 @@ import numpy as np
 from labs.algorithms import ddp
 from labs.algorithms.ddp import Iterate
 from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
+from labs.models.coordinates import coordinate_labels
 from labs.models.mechanisms import mechanism
 from labs.optimal_control.ddp.disturbances import apply_impulse, sample_noise
 from labs.optimal_control.ddp.history import History, thin_out
@@ -234,6 +235,9 @@ class Ddp(Lab[DdpParams, DdpState]):
             | portrait_fields(state.history, _played(state), params.motion.shown_joint)
             | plan_gain_fields(state.plan)
         )
+
+    def labels(self, params: DdpParams) -> Mapping[str, tuple[str, ...]]:
+        return coordinate_labels(mechanism(params.system))
 
     def draw(self, scene: Scene, params: DdpParams, state: DdpState) -> None:
         """The robot under feedback, its open-loop ghost, and the paths of plan and iterations."""

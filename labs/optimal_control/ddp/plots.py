@@ -34,7 +34,7 @@ PLOTS: tuple[Plot, ...] = (
     ),
     TimeSeries(
         "Position",
-        "rad; m",
+        "{q_unit}",
         Line("q", "q"),
         Line("q_open", r"q^{\text{open}}", "dash"),
         Line("q_bar", r"\bar q", "limit"),
@@ -42,7 +42,7 @@ PLOTS: tuple[Plot, ...] = (
     ),
     TimeSeries(
         "Control",
-        "N·m; N",
+        "{u_unit}",
         Line("u", r"u = \bar u + K (x - \bar x)"),
         Line("u_bar", r"\bar u", "limit"),
         select="motor",
@@ -77,7 +77,7 @@ PLOTS: tuple[Plot, ...] = (
     ),
     TimeSeries(
         "Velocity",
-        "rad/s; m/s",
+        "{v_unit}",
         Line("v", "v"),
         Line("v_open", r"v^{\text{open}}", "dash"),
         Line("v_bar", r"\bar v", "limit"),

@@ -16,6 +16,7 @@ from labs.optimal_control.lqr.plots import (
     PLOTS,
     closed_loop_fields,
     comparison_fields,
+    plot_labels,
     recursion_fields,
     region_fields,
 )
@@ -252,6 +253,9 @@ class Lqr(Lab[LqrParams, LqrState]):
             | recursion_fields(regulator)
             | comparison_fields(params.system, state.differences, state.seconds)
         )
+
+    def labels(self, params: LqrParams) -> Mapping[str, str | tuple[str, ...]]:
+        return plot_labels(params.linear_system)
 
     def draw(self, scene: Scene, params: LqrParams, state: LqrState) -> None:
         """The system, a ghost at its rest, and the forces on it."""

@@ -4,16 +4,20 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from labs.models.coordinates import coordinate_labels
 from labs.optimal_control.lqr.comparison import COMPARED_HORIZONS, HORIZON_COUNT
 from labs.optimal_control.lqr.region_of_attraction import HALF_WIDTHS, SYSTEM_CODES, grid_axes
 from labs.optimal_control.lqr.regulator import Regulator, last_settled
 from labs.plots import Curves, Line, Matrix, Plot, Readout, TimeSeries, Trace
+from labs.tasks.regulation.linear_systems import LinearSystem
+
+WITH_REGION = {"system": tuple(SYSTEM_CODES)}
 
 PLOTS: tuple[Plot, ...] = (
-    TimeSeries("Deviation", "rad, m", Line("dq", "q - q_{eq}"), select="coordinate"),
+    TimeSeries("Deviation", "{q_unit}", Line("dq", "q - q_{eq}"), select="joint"),
     TimeSeries(
         "Control",
-        "N, N·m",
+        "{u_unit}",
         Line("u", "u"),
         Line("u_max", "u_{max}", "limit"),
         Line("u_min", "-u_{max}", "limit"),
@@ -21,11 +25,12 @@ PLOTS: tuple[Plot, ...] = (
     ),
     Curves(
         "Where the policy recovers",
-        "lean from the rest [rad] (mass: place [m])",
-        "its rate [rad/s] (mass: [m/s])",
+        "{phase}",
+        "{phase_rate}",
         Trace("region_x", "region_y", "comes back", "points", 3),
         Trace("path_x", "path_y", "so far", "line", 1),
         Trace("now_x", "now_y", "now", "points", 2),
+        when=WITH_REGION,
     ),
     TimeSeries(
         "Cost",
@@ -45,7 +50,7 @@ PLOTS: tuple[Plot, ...] = (
     Curves(
         "Gain, backward from N",
         "t [steps]",
-        "Kₜ,₁ᵢ / steady (UR5: Kₜ,ᵢᵢ)",
+        "{gain_entry} / steady",
         Trace("k_steps", "k", "i = {}", "line", 1),
         Trace("k_mark", "k_span", "constant before", "dash", 0),
     ),
@@ -58,7 +63,7 @@ PLOTS: tuple[Plot, ...] = (
         guide="unit-circle",
         equal=True,
     ),
-    TimeSeries("Velocity", "rad/s, m/s", Line("v", r"\dot q"), select="coordinate"),
+    TimeSeries("Velocity", "{v_unit}", Line("v", r"\dot q"), select="joint"),
     Curves(
         "Time to solve",
         "N",
@@ -79,10 +84,22 @@ PLOTS: tuple[Plot, ...] = (
     Matrix("Gain now", "gain", "K_t", shade=True),
     Readout("to_end", "Time to go", "s"),
     Readout("growth", "Growth of a small deviation", "a step"),
-    Readout("lean", "Largest lean recovered", "rad, m"),
+    Readout("lean", "Largest lean recovered", "{phase_unit}", when=WITH_REGION),
     Readout("recursions", "Riccati steps to the steady state", "", whole=True),
     Readout("settled", "Constant gains, of N", "", whole=True),
 )
+
+
+def plot_labels(system: LinearSystem) -> dict[str, str | tuple[str, ...]]:
+    """The coordinates of the system, and the one whose phase plane is shown: the last."""
+    named = coordinate_labels(system.mechanism)
+    unit, rate = named["q_unit"][-1], named["v_unit"][-1]
+    return named | {
+        "phase": f"{'place' if unit == 'm' else 'lean from the rest'} [{unit}]",
+        "phase_rate": f"its rate [{rate}]",
+        "phase_unit": unit,
+        "gain_entry": "Kₜ,ᵢᵢ" if system.nu > 1 else "Kₜ,₁ᵢ",
+    }
 
 
 def region_fields(system: str, region: np.ndarray, path: np.ndarray) -> dict[str, np.ndarray]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from labs.algorithms.riccati import prepare
 from labs.lab import Action, Handle, Inputs, Lab, Measurement, State
+from labs.models.coordinates import coordinate_labels
 from labs.models.discrete import Discrete
 from labs.models.mechanisms import Mechanism, mechanism
 from labs.optimal_control.lqr_tracking.laps import (
@@ -171,6 +172,10 @@ class LqrTracking(Lab[TrackingParams, TrackingState]):
     def fields(self, params: TrackingParams, state: TrackingState) -> Mapping[str, np.ndarray]:
         """The gain now, and over the preview k and the gains of one motor."""
         return preview_fields(params.policy_at(state.phase), COSTED_JOINT[params.robot])
+
+    def labels(self, params: TrackingParams) -> Mapping[str, str | tuple[str, ...]]:
+        first = "cart" if params.robot == "cart-pole" else "shoulder"
+        return coordinate_labels(mechanism(params.robot)) | {"first_motor": first}
 
     def edit(
         self, params: TrackingParams, handle: str, point: tuple[float, float, float]

@@ -17,7 +17,7 @@ PLOTS: tuple[Plot, ...] = (
     ),
     TimeSeries(
         "Control",
-        "N·m, N",
+        "{u_unit}",
         Line("u", "u", "dash"),
         Line("feedback", r"K_t (x - x^{ref})"),
         Line("u_ref", "u^{ref}"),
@@ -25,7 +25,7 @@ PLOTS: tuple[Plot, ...] = (
         select="motor",
     ),
     TimeSeries(
-        "Joints", "rad, m", Line("q", "q"), Line("q_ref", "q^{ref}", "dash"), select="joint"
+        "Joints", "{q_unit}", Line("q", "q"), Line("q_ref", "q^{ref}", "dash"), select="joint"
     ),
     TimeSeries(
         "Cost of a lap",
@@ -37,13 +37,13 @@ PLOTS: tuple[Plot, ...] = (
     Curves(
         "Affine term over the preview",
         "time ahead [s]",
-        "k [N·m, N]",
+        "k [{u_unit}]",
         Trace("ahead", "k", "k, motor {}", series=1),
     ),
     Curves(
         "Gains over the preview",
         "time ahead [s]",
-        "K of the shoulder, or the cart",
+        "K of the {first_motor}",
         Trace("ahead", "K_q", "by q{}", "line", 1),
         Trace("ahead", "K_v", "by v{}", "dash", 1),
     ),

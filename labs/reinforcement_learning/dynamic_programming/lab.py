@@ -205,10 +205,13 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
     ) -> Mapping[str, np.ndarray]:
         task = state.tabular_task
         stages, _ = finite_horizon(state.task, params.w_f)
+        V, policy = _shown(params, state)
+        if policy is not None and policy[0] == RANDOM:
+            policy = unpack_policy(task.mdp, policy)
         return {
             **convergence_curves(state.iterates, task.mdp.gamma, POINTS),
             **horizon_curves(task, stages, int(params.to_go)),
-            **table_maps(task, *_shown(params, state)),
+            **table_maps(task, V, policy),
             **table_sizes(int(params.joints), int(params.cuts)),
         }
 
@@ -220,6 +223,11 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         if mdp.terminal.any() and not mdp.can_end.all():
             about += f"\nFrom {int((~mdp.can_end).sum())} states no way leads to a goal."
         return {"account": iteration_report(state.iterates, state.seconds), "about": about}
+
+    def labels(self, params: DynamicProgrammingParams) -> Mapping[str, str]:
+        if params.world == "grid":
+            return {"across": "column", "up": "row from below"}
+        return {"across": "angle from upright [rad]", "up": "velocity [rad/s]"}
 
     def draw(
         self, scene: Scene, params: DynamicProgrammingParams, state: DynamicProgrammingState

@@ -8,9 +8,12 @@ from labs.reinforcement_learning.dynamic_programming.side_by_side import (
 )
 from labs.reinforcement_learning.dynamic_programming.tasks import HORIZON, TabularTask
 from labs.tasks.grid_world.map import GridWorld
+from labs.tasks.grid_world.policy_arrows import policy_arrows
+from labs.tasks.pendulum_table.policy_arrows import torque_arrows
 from labs.tasks.pendulum_table.table import table_size
 
 JOINTS = np.arange(1.0, 8.0)
+PENDULUM = {"world": ("pendulum",)}
 POINTS, PIXELS = 250, 51
 """Of a curve and along one side of a heat map, at most."""
 
@@ -54,28 +57,10 @@ PLOTS: tuple[Plot, ...] = (
         Line("paid", r"\text{paid}"),
         Line("promised", r"\text{paid} + \gamma^k V(x_k)", "limit"),
     ),
-    TimeSeries("Pendulum from upright", "rad", Line("angle", r"q - q^*")),
-    TimeSeries("Torque of the pendulum", "N·m", Line("torque", r"u")),
-    HeatMap(
-        "Cost-to-go",
-        "across",
-        "up",
-        "V",
-        "column; angle from upright [rad]",
-        "row from below; velocity [rad/s]",
-        "V",
-        gaps=True,
-    ),
-    HeatMap(
-        "Policy",
-        "across",
-        "up",
-        "control",
-        "column; angle from upright [rad]",
-        "row from below; velocity [rad/s]",
-        "control, from 0; torque [N·m]",
-        gaps=True,
-    ),
+    TimeSeries("Pendulum from upright", "rad", Line("angle", r"q - q^*"), when=PENDULUM),
+    TimeSeries("Torque of the pendulum", "N·m", Line("torque", r"u"), when=PENDULUM),
+    HeatMap("Cost-to-go", "x", "y", "V", "{across}", "{up}", "V", gaps=True),
+    HeatMap("Policy", "x", "y", "V", "{across}", "{up}", "V", gaps=True, arrows="policy"),
     Curves(
         "States of a table by joints",
         "joints j",
@@ -111,19 +96,22 @@ def horizon_curves(task: TabularTask, stages: np.ndarray, to_go: int) -> dict[st
 def table_maps(
     task: TabularTask, V: np.ndarray, policy: np.ndarray | None
 ) -> dict[str, np.ndarray]:
-    """V (X,) and a policy (X,), if any, seen from above: NaN where there is none."""
-    place = task.place
-    controls = np.full(task.mdp.X, np.nan) if policy is None else policy.astype(float)
+    """V (X,), seen from above, NaN where there is none, and a policy, (X,) controls or (X, U)
+    probabilities, if any, as arrows."""
+    place, arrows, everywhere = task.place, np.zeros((0, 4)), np.full(task.mdp.X, True)
     if isinstance(place, GridWorld):
         rows, columns = place.shape
-        across, up = np.arange(1.0, columns + 1), np.arange(1.0, rows + 1)
-        values, control = (place.on_map(x, np.nan)[::-1] for x in (V, controls))
+        x, y = np.arange(1.0, columns + 1), np.arange(1.0, rows + 1)
+        values = place.on_map(V, np.nan)[::-1]
+        if policy is not None:
+            arrows = policy_arrows(place, policy, everywhere)
     else:
         every = -(-place.q_nodes // PIXELS)
-        across, up = place.angles[::every], place.velocities[::every]
-        tables = (V, controls if policy is None else place.torques[policy, 0])
-        values, control = (x.reshape(place.shape)[::every, ::every].T for x in tables)
-    return {"across": across, "up": up, "V": values, "control": control}
+        x, y = place.angles[::every], place.velocities[::every]
+        values = V.reshape(place.shape)[::every, ::every].T
+        if policy is not None and policy.ndim == 1:
+            arrows = torque_arrows(place, policy, everywhere)
+    return {"x": x, "y": y, "V": values, "policy": arrows}
 
 
 def table_sizes(joints: int, nodes: int) -> dict[str, np.ndarray]:

@@ -147,6 +147,9 @@ class Markov(Lab[MarkovParams, MarkovState]):
             "value": about_value(process, params.gamma),
         }
 
+    def labels(self, params: MarkovParams) -> Mapping[str, tuple[str, ...]]:
+        return {"state": params.process.table.states}
+
     def draw(self, scene: Scene, params: MarkovParams, state: MarkovState) -> None:
         process, walk, (source, target) = params.process, state.walk, params.chosen_states
         flow = walk.mu + walk.phase * (walk.next_mu - walk.mu)

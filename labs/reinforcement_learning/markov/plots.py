@@ -10,7 +10,7 @@ GAMMAS = np.concatenate([np.linspace(0.0, 0.95, 39), np.linspace(0.96, 1.0, 11)]
 
 PLOTS: tuple[Plot, ...] = (
     Note("The chain in words", "chain"),
-    Bars("Distribution now, and in the long run", "mu", r"\mu_k", "", marks="far"),
+    Bars("Distribution now, and in the long run", "mu", r"\mu_k", "", marks="far", names="state"),
     TimeSeries(
         "Probability of each state",
         "long run dashed",
@@ -32,9 +32,17 @@ PLOTS: tuple[Plot, ...] = (
         Trace("re", "im", style="points", series=1),
         guide="unit-circle",
     ),
-    Matrix("Transition matrix", "P", "P", shade=True),
+    Matrix("Transition matrix", "P", "P", shade=True, rows="state"),
     Note("The value in words", "value"),
-    Bars("Cost-to-go by iteration, and exact", "V", r"V_k", "", marks="exact", gaps=True),
+    Bars(
+        "Cost-to-go by iteration, and exact",
+        "V",
+        r"V_k",
+        "",
+        marks="exact",
+        gaps=True,
+        names="state",
+    ),
     Curves(
         "Error of the iteration",
         "iteration k",
@@ -47,11 +55,11 @@ PLOTS: tuple[Plot, ...] = (
         "Mean cost (1 − γ) V over the discount",
         "γ",
         "cost of a step",
-        Trace("gammas", "means", "{}", series=1),
+        Trace("gammas", "means", "{state}", series=1),
         Trace("gammas", "mean", "chosen state", "marked"),
         Trace("now", "span", "γ now", "dash", 2),
     ),
-    Matrix("Action values, a row a state", "Q", r"Q", shade=True),
+    Matrix("Action values, a row a state", "Q", r"Q", shade=True, rows="state"),
     Readout("steps", "Steps walked", "", whole=True),
     Readout("off", "μ off the long run", "%"),
     Readout("visits_off", "Visits off the long run", "%"),

@@ -156,6 +156,19 @@ class TdControl(Lab[TdParams, TdState]):
         shown = learner_maps(task, training["q"][m, s], training["visits"][m, s], control)
         return shown | learning_curves(task, training)
 
+    def labels(self, params: TdParams) -> Mapping[str, str | tuple[str, ...]]:
+        names = [LEARNING_METHODS[name] for name in params.methods]
+        if len(set(names)) < len(names):
+            names = [f"{name}, {order}" for name, order in zip(names, ORDER, strict=True)]
+        grid = params.system == "grid"
+        return {
+            "method": tuple(names),
+            "first": names[0],
+            "second": names[1] if len(names) > 1 else "",
+            "across": "column" if grid else "angle from upright [rad]",
+            "up": "row from below" if grid else "velocity [rad/s]",
+        }
+
     def draw(self, scene: Scene, params: TdParams, state: TdState) -> None:
         task, training, (m, s) = params.task, _current(params, state), params.view
         tables, known = training["q"][:, s], training["visits"][m, s].any(axis=1)

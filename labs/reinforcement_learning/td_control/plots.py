@@ -3,12 +3,17 @@
 import numpy as np
 
 from labs.plots import Curves, HeatMap, Line, Plot, Readout, TimeSeries, Trace
+from labs.reinforcement_learning.td_control.params import LEARNING_METHODS
 from labs.reinforcement_learning.td_control.tasks import LearningTask
 from labs.reinforcement_learning.td_control.training import CURVES, Training
 from labs.tasks.grid_world.map import GridWorld
+from labs.tasks.grid_world.policy_arrows import policy_arrows
+from labs.tasks.pendulum_table.policy_arrows import torque_arrows
 
 ORDER = ("first", "second")
-AXES = ("column, or angle from upright [rad]", "row from below, or velocity [rad/s]")
+AXES = ("{across}", "{up}")
+SECOND = {"second": tuple(LEARNING_METHODS)}
+"""Where there is a second method."""
 WINDOW = 10
 """Batches over which the cost of learning is averaged."""
 
@@ -17,7 +22,7 @@ def _curves(title: str, y_label: str, mean: str, *edges: str) -> Curves:
     """Over episodes, for both methods: a line, dashed ones, and what dynamic programming says."""
     traces = []
     for i, name in enumerate(ORDER):
-        traces.append(Trace(f"episodes_{name}", f"{mean}_{name}", name, series=1 + i))
+        traces.append(Trace(f"episodes_{name}", f"{mean}_{name}", f"{{{name}}}", series=1 + i))
         traces += [Trace(f"episodes_{name}", f"{edge}_{name}", "", "dash", 1 + i) for edge in edges]
     if mean in ("online", "offline"):
         traces.append(Trace("best_x", "best_y", "optimal", "dash"))
@@ -29,16 +34,16 @@ PLOTS: tuple[Plot, ...] = (
     _curves("Cost of the greedy policy, median", "J", "offline"),
     _curves("Distance to Q*", "mean (root of squares); dashed: largest", "off", "most"),
     HeatMap("Q of the learner shown", "x", "y", "q", *AXES, "Q", gaps=True),
-    HeatMap("Greedy policy", "x", "y", "policy", *AXES, "u", gaps=True),
+    HeatMap("Greedy policy", "x", "y", "value", *AXES, "min Q", gaps=True, arrows="policy"),
     HeatMap("Visits", "x", "y", "visits", *AXES, "log₁₀(1 + n)", gaps=True),
     HeatMap("Error of min Q", "x", "y", "error", *AXES, "|V − V*|", gaps=True),
     TimeSeries("Cost of the walk in the scene", "", Line("paid", "J"), select="method"),
     Readout("trained", "Episodes of each learner", "", whole=True),
     Readout("optimum", "Optimal cost", ""),
-    Readout("greedy_first", "Greedy, median, first", ""),
-    Readout("greedy_second", "Greedy, median, second", ""),
-    Readout("best_first", "Optimal learners, first", "", whole=True),
-    Readout("best_second", "Optimal learners, second", "", whole=True),
+    Readout("greedy_first", "Greedy, median, {first}", ""),
+    Readout("greedy_second", "Greedy, median, {second}", "", when=SECOND),
+    Readout("best_first", "Optimal learners, {first}", "", whole=True),
+    Readout("best_second", "Optimal learners, {second}", "", whole=True, when=SECOND),
 )
 
 
@@ -46,20 +51,23 @@ def learner_maps(
     task: LearningTask, q: np.ndarray, visits: np.ndarray, control: int
 ) -> dict[str, np.ndarray]:
     """Of one learner's Q and visits, both (X, U), seen from above, row 0 on top: NaN where there is
-    nothing to show. `control` counts from 1; 0: the best in each state."""
+    nothing to show; the greedy policy as arrows, where it has been. `control` counts from 1; 0: the
+    best in each state."""
     value, best = q.min(axis=1), np.where(task.compared, task.q_star.min(axis=1), np.nan)
     values = {
         "q": q[:, control - 1] if control else value,
+        "value": value,
         "visits": np.log10(1.0 + visits.sum(axis=1)),
         "error": np.abs(value - best),
     }
+    known = visits.any(axis=1)
     if isinstance(task.place, GridWorld):
         rows, columns = task.shape
-        axes = {"x": np.arange(columns), "y": np.arange(rows)}
-        values["policy"], upwards = q.argmin(axis=1) + 1.0, -1
+        axes = {"x": np.arange(1.0, columns + 1), "y": np.arange(1.0, rows + 1)}
+        axes["policy"], upwards = policy_arrows(task.place, q.argmin(axis=1), known), -1
     else:
         axes = {"x": task.place.angles, "y": task.place.velocities}
-        values["policy"], upwards = task.place.torques[q.argmin(axis=1), 0], 1
+        axes["policy"], upwards = torque_arrows(task.place, q.argmin(axis=1), known), 1
     return axes | {name: task.on_map(of, np.nan)[::upwards] for name, of in values.items()}
 
 

@@ -1,7 +1,9 @@
 // One bar a component, the limit each must stay within, and marks to compare with.
 
+import { number } from "../format.js";
 import { card } from "./card.js";
 import { around, Chart } from "./chart.js";
+import { sentences } from "./summary.js";
 import { symbol } from "./symbol.js";
 
 export class Bars {
@@ -17,6 +19,7 @@ export class Bars {
     this.values = fields[this.plot.field].flat();
     this.limits = fields[this.plot.limit]?.flat() ?? [];
     this.marks = fields[this.plot.marks]?.flat() ?? [];
+    this.names = fields[this.plot.names] ?? null;
     this.draw();
   }
 
@@ -27,7 +30,7 @@ export class Bars {
     const fits = this.y && this.y[0] <= wanted[0] && this.y[1] >= wanted[1];
     if (!fits || this.y[1] - this.y[0] > 3 * (wanted[1] - wanted[0])) this.y = wanted;
     const chart = this.chart;
-    chart.begin([0.4, n + 0.6], this.y, { xTicks: n > 30 ? null : this.values.map((_, i) => i + 1) });
+    chart.begin([0.4, n + 0.6], this.y, { xTicks: n > 30 ? null : this.values.map((_, i) => i + 1), xNames: this.names });
     this.values.forEach((value, i) => {
       if (!Number.isFinite(value)) return;
       const [a, b] = [chart.y(Math.max(0, value)), chart.y(Math.min(0, value))];
@@ -41,6 +44,12 @@ export class Bars {
     this.limits.forEach((limit, i) => {
       for (const edge of [limit, -limit]) chart.line([i + 0.6, edge], [i + 1.4, edge], "limit");
     });
+  }
+
+  summary() {
+    if (!this.values) return "";
+    const parts = this.values.map((value, i) => `${this.names?.[i] ?? i + 1}: ${number(value, 3)}`);
+    return sentences(`${this.plot.title}, bars${this.plot.unit ? ` in ${this.plot.unit}` : ""}`, parts);
   }
 
   clear() {

@@ -6,13 +6,16 @@ import { Bars } from "./bars.js";
 import { element } from "./card.js";
 import { Curves } from "./curves.js";
 import { HeatMap } from "./heatmap.js";
+import { isShown } from "./labels.js";
 import { Matrix } from "./matrix.js";
 import { Note } from "./note.js";
 import { forgetColours } from "./palette.js";
 import { Readouts } from "./readouts.js";
 import { Shelf } from "./shelf.js";
+import { summarise } from "./summary.js";
 import { TimeSeries } from "./timeseries.js";
 
+const WORDS_EVERY = 2000; // [ms]
 const KINDS = { TimeSeries, Curves, Bars, Matrix, HeatMap, Note };
 
 export class Board {
@@ -25,12 +28,15 @@ export class Board {
     this.selection = {};
     this.guess = null; // what the reader predicted: {channel, levels} or {channel, x, y}
     this.compared = null; // the run an experiment compares with, and beside which run
+    this.labels = {}; // what the lab says under its present parameters
+    this.said = "{}";
     this.readouts = new Readouts(lab.plots.filter((p) => p.kind === "Readout"), document.getElementById("tiles"));
     this.plots = lab.plots.filter((p) => p.kind in KINDS).map((p) => new KINDS[p.kind](p, this));
     document.getElementById("plots").append(...this.plots.map((plot) => plot.section));
-    this.shelf = new Shelf(this.plots, document.getElementById("tabs"), () => this.refresh());
+    this.shelf = new Shelf(lab.slug, this.plots, () => this.refresh());
     this.series = this.plots.filter((plot) => plot instanceof TimeSeries);
     this.pictured = this.plots.filter((plot) => plot.update);
+    setInterval(() => summarise(this.shelf.shown), WORDS_EVERY);
     this.unzoomButton = document.getElementById("unzoom");
     this.unzoomButton?.addEventListener("click", () => this.unzoom());
     const select = (this.windowMenu = document.getElementById("window"));
@@ -55,8 +61,31 @@ export class Board {
       if (restarted) this.begin(run);
       if (!this.run.length || row[0] > this.run.last) this.run.push(row);
     }
+    if (fields) this.relabel(fields);
     if (fields) for (const plot of this.pictured) plot.update(fields);
     if (rows.length || now) this.refresh();
+  }
+
+  // Of the fields, the words: texts and lists of texts that are no notes.
+  relabel(fields) {
+    const notes = this.plots.map(({ plot }) => plot.note);
+    const isWord = ([name, value]) => typeof [value].flat()[0] === "string" && !notes.includes(name);
+    const words = Object.fromEntries(Object.entries(fields).filter(isWord));
+    const said = JSON.stringify(words);
+    if (said === this.said) return;
+    [this.labels, this.said] = [words, said];
+    this.readouts.relabel(words);
+    this.writeSelectors();
+    for (const plot of this.series) plot.rebuild();
+  }
+
+  // Shows what means something under these parameters.
+  choose(params) {
+    const key = JSON.stringify(params);
+    if (key === this.params) return;
+    this.params = key;
+    this.readouts.choose(params);
+    this.shelf.choose(this.plots.filter(({ plot }) => isShown(plot, params)));
   }
 
   // Another run: what was drawn so far turns into the faint trace.
@@ -182,28 +211,43 @@ export class Board {
     host.replaceChildren(...Object.entries(counts).map(([name, n]) => this.selector(name, n)));
   }
 
+  // Buttons for numbers, a menu for names.
   selector(name, n) {
+    if (this.selected(name) >= n) delete this.selection[name];
+    const names = this.labels[name];
+    if (names?.some((word, i) => word !== String(i + 1))) return this.menu(name, names);
     const field = element("fieldset", "segments");
     field.append(element("legend", "", name));
-    if (this.selected(name) >= n) delete this.selection[name];
     for (const value of [...Array(n).keys(), "all"]) {
       const label = element("label");
       const radio = element("input");
       radio.type = "radio";
       radio.name = `select-${name}`;
       radio.checked = this.selected(name) === value;
-      radio.addEventListener("change", () => {
-        this.selection[name] = value;
-        for (const plot of this.series) {
-          if (plot.plot.select !== name) continue;
-          plot.span = null;
-          plot.hidden.clear();
-          plot.rebuild();
-        }
-      });
+      radio.addEventListener("change", () => this.select(name, value));
       label.append(radio, element("span", "", value === "all" ? "all" : String(value + 1)));
       field.append(label);
     }
     return field;
+  }
+
+  menu(name, names) {
+    const menu = element("select", "small");
+    menu.setAttribute("aria-label", name);
+    menu.title = `Which ${name}`;
+    menu.append(new Option(`all: ${name}`, "all"), ...names.map((word, i) => new Option(word, i)));
+    menu.value = this.selected(name);
+    menu.addEventListener("change", () => this.select(name, menu.value === "all" ? "all" : Number(menu.value)));
+    return menu;
+  }
+
+  select(name, value) {
+    this.selection[name] = value;
+    for (const plot of this.series) {
+      if (plot.plot.select !== name) continue;
+      plot.span = null;
+      plot.hidden.clear();
+      plot.rebuild();
+    }
   }
 }

@@ -6,17 +6,20 @@ const SVG = "http://www.w3.org/2000/svg";
 export class Chart {
   constructor(body, draw) {
     this.body = body;
-    this.svg = svg("svg", { class: "chart", role: "img" });
+    this.svg = svg("svg", { class: "chart", "aria-hidden": "true" });
     body.append(this.svg);
     new ResizeObserver(draw).observe(body);
   }
 
-  // Clears, and draws axes for the ranges. `square` gives both axes the same scale. On a
+  // Clears, and draws axes for the ranges; `xNames` are those of the ticks 1, 2, 3. `square` gives both axes the same scale. On a
   // logarithmic axis the range is of logarithms to the base 10, as are all places drawn.
-  begin([x0, x1], [y0, y1], { square = false, xTicks = null, xLabel = "", yLabel = "", logX = false, logY = false } = {}) {
+  begin([x0, x1], [y0, y1], { square = false, xTicks = null, xNames = null, xLabel = "", yLabel = "", logX = false, logY = false } = {}) {
     const { clientWidth: width, clientHeight: height } = this.body;
     const em = 0.75 * parseFloat(getComputedStyle(document.documentElement).fontSize);
-    const bottom = 2 * em + (xLabel ? 1.4 * em : 0);
+    // Names that are wider than their bars are slanted.
+    const longest = Math.min(12, Math.max(0, ...(xNames ?? []).map((name) => name.length)));
+    const slanted = longest * 0.56 * em > (width - 4 * em) / (xTicks?.length || 1);
+    const bottom = (slanted ? 1.4 + 0.34 * longest : 2) * em + (xLabel ? 1.4 * em : 0);
     const tall = Math.max(1, height - bottom - 0.7 * em);
     const yTicks = (from, to) => (logY ? decades : ticks)(from, to, tall / (3 * em));
     const yText = logY ? power : label;
@@ -39,7 +42,10 @@ export class Chart {
     }
     for (const v of xTicks ?? (logX ? decades : ticks)(x0, x1, this.area.width / (6 * em))) {
       if (!xTicks) this.line([v, y0], [v, y1], v === 0 && !logX ? "zero" : "grid");
-      this.text(this.x(v), top + this.area.height + 1.5 * em, (logX ? power : label)(v), "middle");
+      const text = xNames?.[v - 1] ?? (logX ? power : label)(v);
+      const [x, y] = [this.x(v), top + this.area.height + (slanted ? 1 : 1.5) * em];
+      const made = this.text(x, y, text.length > 12 ? `${text.slice(0, 11)}…` : text, slanted ? "end" : "middle");
+      if (slanted) made.setAttribute("transform", `rotate(-35 ${x} ${y})`);
     }
     if (xLabel) this.text(left + this.area.width / 2, height - 0.35 * em, xLabel, "middle");
     if (yLabel) {

@@ -4,6 +4,9 @@
 import { number } from "../format.js";
 import { card, element } from "./card.js";
 import { around, Chart } from "./chart.js";
+import { fill } from "./labels.js";
+import { outline, placesAlong, swatch } from "./marks.js";
+import { extent, sentences } from "./summary.js";
 
 const SERIES = 8;
 
@@ -17,7 +20,10 @@ export class Curves {
   }
 
   update(fields) {
+    this.xLabel = fill(this.plot.x_label, fields);
+    this.yLabel = fill(this.plot.y_label, fields);
     this.curves = this.plot.traces.flatMap((trace) => this.expand(trace, fields));
+    this.marked = new Set(this.curves.map(({ series }) => series).filter(Boolean)).size > 1;
     this.updateLegend();
     this.draw();
   }
@@ -34,7 +40,7 @@ export class Curves {
     return Array.from({ length: count }, (_, k) => ({
       style: trace.style,
       series: trace.series ? ((trace.series - 1 + k) % SERIES) + 1 : 0,
-      label: labels ? labels[k] : trace.label.replace("{}", k + 1),
+      label: labels ? labels[k] : fill(trace.label, fields, k),
       note: trace.note ? (fields[trace.note] ?? [])[k] : undefined,
       points: xs
         .map((v, i) => [place(Array.isArray(v) ? v[k] : v, logX), place(several ? ys[i][k] : ys[i], logY)])
@@ -59,9 +65,9 @@ export class Curves {
   }
 
   entry({ label, style, series, note }) {
-    const button = element("button", style === "points" ? "points" : style === "dash" ? "dash" : "");
+    const button = element("button");
     button.type = "button";
-    button.style.setProperty("--tone", tone(series));
+    button.append(swatch(style, tone(series), this.marked || style === "marked" ? series : 0));
     button.setAttribute("aria-pressed", String(!this.hidden.has(label)));
     button.title = "Show or hide";
     button.append(element("span", "", label), element("b", "note"));
@@ -81,7 +87,8 @@ export class Curves {
 
   draw() {
     if (!this.curves || !this.body.clientWidth) return;
-    const { guide, equal, x_label: xLabel, y_label: yLabel, log_x: logX, log_y: logY } = this.plot;
+    const { guide, equal, log_x: logX, log_y: logY } = this.plot;
+    const { xLabel, yLabel } = this;
     const shown = this.shown;
     const circle = guide === "unit-circle";
     const axis = guide === "imaginary-axis" || guide === "left-half-plane";
@@ -110,10 +117,22 @@ export class Curves {
       const path = places.map((place) => place.map((v) => v.toFixed(1)).join(",")).join(" ");
       chart.add("polyline", { class: `curve tone ${style}`, style: colour, points: path });
     }
-    if (style === "points" || style === "marked") {
-      const r = style === "points" ? 4.5 : 2.5;
-      for (const [cx, cy] of places) chart.add("circle", { cx, cy, r, class: "point tone", style: colour });
+    const own = style === "points" || style === "marked";
+    if (!own && !(this.marked && series)) return;
+    const size = style === "points" ? 1.2 : style === "marked" ? 0.8 : 1;
+    for (const [x, y] of own ? places : placesAlong(places, series)) {
+      const at = `translate(${x.toFixed(1)} ${y.toFixed(1)}) scale(${size})`;
+      chart.add("path", { d: outline(series), transform: at, class: "point tone", style: colour });
     }
+  }
+
+  summary() {
+    if (!this.curves) return "";
+    const value = (v) => (this.plot.log_y ? 10 ** v : v);
+    const there = this.curves.filter(({ points }) => points.length);
+    const parts = there.map(({ label, points }) =>
+      `${label || "points"}: ${points.length} points, ${extent(points.map(([, y]) => value(y)))}`);
+    return sentences(`${this.plot.title}: ${this.yLabel || "values"} over ${this.xLabel}`, parts);
   }
 
   clear() {

@@ -14,20 +14,24 @@ export class Matrix {
 
   update(fields) {
     const rows = fields[this.plot.field];
+    const names = fields[this.plot.rows] ?? null;
     if (!rows) return;
     const cells = rows.map((row) => [row].flat());
     const largest = Math.max(...cells.flat().map((value) => Math.abs(value ?? 0)), 1e-9);
     const decimals = decimalsFor(largest);
-    if (this.table.rows.length !== cells.length || this.table.rows[0]?.cells.length !== cells[0].length) {
-      this.table.replaceChildren(...cells.map((row) => {
+    const shape = JSON.stringify([names, cells.length, cells[0]?.length]);
+    if (shape !== this.shape) {
+      this.shape = shape;
+      this.table.replaceChildren(...cells.map((row, i) => {
         const made = element("tr");
+        if (names) made.append(element("th", "", names[i]));
         made.append(...row.map(() => element("td")));
         return made;
       }));
     }
     cells.forEach((row, i) => row.forEach((value, j) => {
       const text = digits(value, decimals);
-      const cell = this.table.rows[i].cells[j];
+      const cell = this.table.rows[i].cells[j + (names ? 1 : 0)];
       if (cell.textContent !== text) cell.textContent = text;
       if (this.plot.shade) cell.style.backgroundColor = diverging((value ?? 0) / largest);
     }));

@@ -2,31 +2,47 @@
 
 import { number } from "../format.js";
 import { element } from "./card.js";
+import { fill, isShown } from "./labels.js";
 
 export class Readouts {
   constructor(plots, host) {
-    this.tiles = plots.map(({ channel, label, unit, whole }) => {
+    this.tiles = plots.map((plot) => {
       const tile = element("div", "tile");
-      const name = element("span", "", label);
-      name.title = label;
+      const name = element("span");
       const line = element("div");
       const output = element("output", "", "—");
-      output.setAttribute("aria-label", label);
-      line.append(output, " ", element("small", "", unit));
+      const small = element("small");
+      line.append(output, " ", small);
       tile.append(name, line);
       host.append(tile);
-      return { tile, label, channel, output, whole };
+      return { plot, tile, name, output, small };
     });
     host.hidden = plots.length === 0;
+    this.relabel({});
+  }
+
+  // The names and units as the parameters have them.
+  relabel(labels) {
+    for (const { plot, name, output, small } of this.tiles) {
+      const label = fill(plot.label, labels);
+      name.textContent = name.title = label;
+      output.setAttribute("aria-label", label);
+      small.textContent = fill(plot.unit, labels);
+    }
+  }
+
+  // Those that mean something under these parameters.
+  choose(params) {
+    for (const { plot, tile } of this.tiles) tile.hidden = !isShown(plot, params);
   }
 
   // Marks the one of this label; none for "".
   mark(wanted) {
-    for (const { tile, label } of this.tiles) tile.classList.toggle("marked", label === wanted);
+    for (const { plot, tile } of this.tiles) tile.classList.toggle("marked", plot.label === wanted);
   }
 
   update(run, now) {
-    for (const { channel, output, whole } of this.tiles) {
+    for (const { plot: { channel, whole }, output } of this.tiles) {
       const value = now ? now[run.columns.indexOf(channel)] : run.latest(channel);
       const text = whole && Number.isInteger(value) ? String(value) : number(value, 3);
       if (output.textContent !== text) output.textContent = text;

@@ -4,7 +4,11 @@
 import { number } from "../format.js";
 import { card, element } from "./card.js";
 import { drawGuess, guessedValues } from "./guess.js";
+import { fill } from "./labels.js";
+import { markCurves } from "./marking.js";
+import { DASHES, swatch } from "./marks.js";
 import { colour, SERIES } from "./palette.js";
+import { extent, sentences } from "./summary.js";
 import { symbol } from "./symbol.js";
 
 const DENSITY = 3; // samples a pixel that are worth drawing
@@ -14,7 +18,7 @@ export class TimeSeries {
   constructor(plot, board) {
     this.plot = plot;
     this.board = board;
-    Object.assign(this, card(plot.title, plot.unit));
+    Object.assign(this, card(plot.title));
     this.hidden = new Set(); // lines and components switched off in the legend
     this.span = null; // the y range shown last
     this.readAt = 0;
@@ -46,10 +50,19 @@ export class TimeSeries {
     });
     for (const curve of curves) {
       const several = this.components > 1 && curve.c !== null;
-      const tone = `series-${((several ? curve.c : curve.l) % SERIES) + 1}`;
-      curve.tone = curve.line.style === "limit" ? "limit" : tone;
+      const limit = curve.line.style === "limit";
+      curve.series = limit ? 0 : ((several ? curve.c : curve.l) % SERIES) + 1;
+      curve.tone = limit ? "limit" : `series-${curve.series}`;
     }
     this.curves = curves;
+    this.marked = new Set(curves.map(({ series }) => series).filter(Boolean)).size > 1;
+  }
+
+  // The unit of what is shown; empty where the components shown have several.
+  get unit() {
+    const shown = [...new Set(this.curves.map(({ c }) => c))];
+    const units = new Set(shown.map((c) => fill(this.plot.unit, this.board.labels, c)));
+    return units.size === 1 ? [...units][0] : "";
   }
 
   // Builds the chart anew: for other columns, another selection or another theme.
@@ -83,7 +96,7 @@ export class TimeSeries {
       series: [{}, ...this.curves.map((curve) => this.series(curve))],
       hooks: {
         drawAxes: [(u) => this.drawAreas(u), (u) => this.drawGhost(u)],
-        draw: [(u) => drawGuess(u, this.guess)],
+        draw: [(u) => markCurves(this, u), (u) => drawGuess(u, this.guess)],
         setSelect: [(u) => this.zoom(u)],
         setCursor: [() => this.readOut(true)],
       },
@@ -95,7 +108,7 @@ export class TimeSeries {
   }
 
   series({ line, tone, l, c }) {
-    const dash = { dash: [7, 5], limit: [3, 4] }[line.style];
+    const dash = DASHES[line.style];
     const limit = line.style === "limit";
     const area = this.isArea(line);
     return {
@@ -249,22 +262,29 @@ export class TimeSeries {
   writeLegend() {
     this.legend.replaceChildren();
     this.values = [];
+    this.setUnit(this.unit);
     const several = this.components > 1;
     const lines = new Map(this.curves.map((curve) => [curve.l, curve]));
-    for (const [l, { line, tone, c }] of lines) {
-      const button = this.switch(`l${l}`, this.isArea(line) ? "area" : line.style, several && line.style !== "limit" ? "axis" : tone);
+    for (const [l, { line, tone, series, c }] of lines) {
+      const style = this.isArea(line) ? "area" : line.style;
+      const mark = this.marked && !several && style !== "area" ? series : 0;
+      const button = this.switch(`l${l}`, style, several && style !== "limit" ? "axis" : tone, mark);
       button.append(symbol(line.mathml, several ? null : c));
       if (!several) this.values.push([l, button.appendChild(element("output", "", "—"))]);
     }
+    const { labels } = this.board;
     for (let c = 0; several && c < this.components; c++) {
-      this.switch(`c${c}`, "part", `series-${(c % SERIES) + 1}`).append(String(c + 1));
+      const series = (c % SERIES) + 1;
+      const button = this.switch(`c${c}`, "part", `series-${series}`, series);
+      button.append(labels[this.plot.select]?.[c] ?? String(c + 1));
+      if (!this.unit && this.plot.unit) button.append(element("small", "", fill(this.plot.unit, labels, c)));
     }
   }
 
-  switch(key, style, tone) {
+  switch(key, style, tone, series) {
     const button = element("button", style);
     button.type = "button";
-    button.style.setProperty("--tone", `var(--${tone})`);
+    button.append(swatch(style, `var(--${tone})`, series));
     button.setAttribute("aria-pressed", String(!this.hidden.has(key)));
     button.title = "Show or hide";
     button.addEventListener("click", () => {
@@ -312,6 +332,17 @@ export class TimeSeries {
     this.box.style.gridTemplateColumns = `repeat(${rows.length ? this.plot.lines.length : 1}, auto)`;
     const right = left > u.over.clientWidth / 2;
     this.box.style.insetInline = right ? "0.25rem auto" : "auto 0.25rem";
+  }
+
+  summary() {
+    const [t, ...all] = this.uplot?.data ?? [[]];
+    if (!t.length) return `${this.plot.title}: no curves yet.`;
+    const names = this.board.labels[this.plot.select];
+    const parts = this.curves.map(({ line, c }, i) => {
+      const which = this.components > 1 && c !== null ? `, ${this.plot.select} ${names?.[c] ?? c + 1}` : "";
+      return `${symbol(line.mathml).textContent}${which}: ${extent(all[i])} ${fill(this.plot.unit, this.board.labels, c)}`.trimEnd();
+    });
+    return sentences(`${this.plot.title} over time, ${number(t[0], 3)} s to ${number(t[t.length - 1], 3)} s`, parts);
   }
 
   resize() {

@@ -143,7 +143,10 @@ def test_cells_without_a_state_have_no_value_and_all_others_do() -> None:
     fields = world.lab.fields(world.params, world.state)
     wall = [[False, False, False], [False, False, True]]
     np.testing.assert_array_equal(np.isnan(fields["V"]), wall)
-    np.testing.assert_array_equal(np.isnan(fields["control"]), wall)
+    ways = {(x, y): (right, up) for x, y, right, up in fields["policy"].tolist()}
+    assert ways.keys() == {(1, 2), (1, 1), (2, 1)}, "every cell but the goal, the top row is y = 2"
+    assert ways[1, 1] == ways[2, 1] == (1, 0)
+    assert ways[1, 2] == (0, -1)
     measured = world.lab.measure(world.params, world.state)
     assert measured["at_start"] == pytest.approx(1 + 0.95 + 0.95**2)
     assert measured["error"] < 1e-6

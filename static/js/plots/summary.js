@@ -1,0 +1,31 @@
+// Plots in words, for those who do not see them: what is drawn over what, and in which range.
+
+import { number } from "../format.js";
+
+// "from −0.1 to 0.3, last 0.2": of numbers among which some may be missing.
+export function extent(values) {
+  let [low, high, last] = [Infinity, -Infinity, null];
+  for (const value of values) {
+    if (!Number.isFinite(value)) continue;
+    low = Math.min(low, value);
+    high = Math.max(high, value);
+    last = value;
+  }
+  if (last === null) return "no values";
+  if (low === high) return `constant ${number(low, 3)}`;
+  return `from ${number(low, 3)} to ${number(high, 3)}, last ${number(last, 3)}`;
+}
+
+// A heading, and a sentence of each of some parts; of many, how many more there are.
+export function sentences(heading, parts, most = 12) {
+  const more = parts.length > most ? [`and ${parts.length - most} more`] : [];
+  return `${heading}. ${[...parts.slice(0, most), ...more].join("; ")}.`;
+}
+
+// Says what each plot shows now; for a screen reader, which reads it when asked and not before.
+export function summarise(plots) {
+  for (const plot of plots) {
+    const summary = plot.summary?.();
+    if (summary && plot.body.getAttribute("aria-label") !== summary) plot.body.setAttribute("aria-label", summary);
+  }
+}

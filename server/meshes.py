@@ -1,6 +1,8 @@
 """Shapes as the scene wants them: glTF with materials, bare triangles, segments of lines. Meshes
 are cached, so that a worker forked from a process that has loaded them finds them in memory."""
 
+import itertools
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -21,6 +23,16 @@ def gltf(visual: Visual) -> bytes:
 def triangles(visual: Visual) -> Triangles:
     """A mesh file or a primitive as triangles, in its own frame."""
     return _triangles(visual.mesh, visual.scale, visual.shape)
+
+
+def outline(pieces: Sequence[Visual]) -> dict[int, np.ndarray]:
+    """Points (k, 3) [m] that reach as far as the pieces do, by the joint they move with."""
+    found: dict[int, list[np.ndarray]] = {}
+    for piece in pieces:
+        local = _corners(piece.mesh, piece.scale, piece.shape)
+        place = piece.placement
+        found.setdefault(piece.joint, []).append(local @ place.rotation.T + place.translation)
+    return {joint: np.concatenate(points) for joint, points in found.items()}
 
 
 @cache
@@ -47,6 +59,16 @@ def arc_with_head(center: np.ndarray, axis: np.ndarray, angle: float, radius: fl
     barbs = [r * (np.cos(back) * x + np.sin(back) * y) for r in (0.85 * radius, 1.15 * radius)]
     head = [[points[-1], center + barb] for barb in barbs]
     return np.concatenate([np.stack([points[:-1], points[1:]], 1), head]).astype(np.float32)
+
+
+@cache
+def _corners(
+    path: str, scale: tuple[float, float, float], shape: Box | Cylinder | Sphere | None
+) -> np.ndarray:
+    """(k, 3) [m]: the vertices that reach farthest along 26 directions."""
+    vertices, _ = _triangles(path, scale, shape)
+    ways = np.array([way for way in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
+    return vertices[np.unique(np.argmax(vertices @ ways.T, axis=0))].astype(float)
 
 
 @cache

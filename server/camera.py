@@ -1,0 +1,234 @@
+"""The camera of a viewer: what is drawn fills the free part of its window.
+
+A lab says from where one looks, and so in which direction. In the camera's axes (right, up,
+forward) a point (x, y, z) is in the window of a camera at c where
+
+    -l (z - c_z) <= x - c_x <= r (z - c_z)   and   -b (z - c_z) <= y - c_y <= t (z - c_z)
+
+with the tangents l, r, b, t of the window's free part. This is linear in c: the nearest camera that
+has all points in its window follows from one extreme over the points for each side, and what
+moves widens those extremes as it goes."""
+
+import itertools
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+import viser
+from numpy.typing import ArrayLike
+
+FOV = np.radians(35.0)
+"""Of the whole height: narrow, so that near and far parts are of similar size."""
+PANEL, BUTTONS, MARGIN = 46, 10, 14
+"""[px] that the folded panel takes on the right, the buttons at the bottom, and air around."""
+NARROW = 500
+"""[px] Where a window is no wider, the panel lies below."""
+ROOM = 1.0
+"""What moves is followed to so many times the size of what was there at first: what runs away
+does not shrink the rest."""
+GLIDE = 0.12
+"""The part of the way to its place that the camera goes in a frame."""
+WORTH_IT = 0.75
+"""A restart moves the camera if it comes nearer than this part of its distance."""
+SAME = 2e-3
+"""Poses that differ by less, in parts of the distance, are one."""
+CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) / np.sqrt(3.0)
+"""(8, 3) of a ball of radius 1."""
+CHARACTER, LINE = 3.6, 18.0
+"""[px] half the width of a character of a label, and the height of its line."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """A viewer's window: its size [px]."""
+
+    width: int
+    height: int
+
+    @property
+    def pixel(self) -> float:
+        """The tangent of one pixel: how wide it is [m] a metre away."""
+        return float(2.0 * np.tan(FOV / 2)) / self.height
+
+    @property
+    def tangents(self) -> np.ndarray:
+        """(4,): of the free part: right, left, top, bottom."""
+        taken = np.array([PANEL if self.width > NARROW else 0, 0, 0, BUTTONS]) + MARGIN
+        half = 0.5 * np.array([self.width, self.width, self.height, self.height])
+        return np.asarray(self.pixel * np.maximum(half - taken, 0.3 * half))
+
+
+def extremes(points: np.ndarray, window: Window) -> np.ndarray:
+    """(6,): the largest x - r z, -x - l z, y - t z, -y - b z, -z and z of points (k, 3) in the
+    camera's axes."""
+    x, y, z = points.T
+    right, left, top, bottom = window.tangents
+    sides = (x - right * z, -x - left * z, y - top * z, -y - bottom * z, -z, z)
+    return np.array([side.max() for side in sides])
+
+
+def nearest(reach: np.ndarray, window: Window) -> np.ndarray:
+    """(3,): the nearest camera, in its own axes, that has all of these extremes in its window."""
+    right, left, top, bottom = window.tangents
+    z = min(
+        -(reach[0] + reach[1]) / (right + left),
+        -(reach[2] + reach[3]) / (top + bottom),
+        -reach[4] - 0.05,
+    )
+    x = 0.5 * (reach[0] + right * z - reach[1] - left * z)
+    y = 0.5 * (reach[2] + top * z - reach[3] - bottom * z)
+    return np.array([x, y, z])
+
+
+def camera_axes(position: ArrayLike, look_at: ArrayLike) -> np.ndarray:
+    """(3, 3): right, up and forward of a camera that stands upright, as rows."""
+    forward = np.asarray(look_at, float) - np.asarray(position, float)
+    forward /= np.linalg.norm(forward)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    return np.array([right, np.cross(right, forward), forward])
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What a frame shows: points (k, 3) [m], and labels as a point and the text's length each."""
+
+    points: np.ndarray
+    labels: list[tuple[np.ndarray, int]]
+
+
+class Camera:
+    """The camera of one viewer. It follows what is drawn until a hand takes it."""
+
+    def __init__(self, client: viser.ClientHandle) -> None:
+        self._client = client
+        self._window = Window(0, 0)
+        self._axes = np.eye(3)
+        self._reach = np.zeros(6)
+        self._bounds = np.zeros((2, 3))
+        self._at: np.ndarray | None = None
+        self._poses: deque[np.ndarray] = deque([self._pose()], maxlen=300)
+
+    def metres_per_pixel(self, point: np.ndarray) -> float:
+        """At a point (3,) [m], wherever the camera is now."""
+        away = float(np.linalg.norm(point - self._client.camera.position))
+        return self._window.pixel * away if self._window.height else 0.0
+
+    def release(self) -> None:
+        """Forgets that a hand has moved it, and begins anew."""
+        self._at = None
+
+    def follow(self, drawn: Drawn, axes: np.ndarray, *, restarted: bool) -> None:
+        """Moves the camera to where all that is drawn, and was since the beginning, is in view."""
+        camera = self._client.camera
+        window = Window(camera.image_width, camera.image_height)
+        if min(window.width, window.height) < 2 or not len(drawn.points):
+            return
+        begins = self._at is None or not np.array_equal(axes, self._axes)
+        resized, self._window = window != self._window, window
+        if not begins and self._held():
+            return
+        local = self._with_labels(drawn, axes)
+        if begins or resized:
+            low, high = local.min(axis=0), local.max(axis=0)
+            room = ROOM * float((high - low).max())
+            self._bounds = np.array([low - room, high + room])
+            self._axes = axes
+        reach = extremes(np.clip(local, *self._bounds), window)
+        if restarted and not begins:
+            begins = self._distance(reach) < WORTH_IT * self._distance(self._reach)
+        jumps = begins or resized
+        self._reach = reach if jumps else np.maximum(reach, self._reach)
+        goal = nearest(self._reach, window)
+        if jumps or self._at is None:
+            self._at = goal
+        elif np.linalg.norm(goal - self._at) < 0.5 * SAME * self._distance(self._reach):
+            return
+        else:
+            self._at = self._at + GLIDE * (goal - self._at)
+        self._move()
+
+    def _distance(self, reach: np.ndarray) -> float:
+        """[m] from the camera to the middle of what is in view."""
+        return float(0.5 * (reach[5] - reach[4]) - nearest(reach, self._window)[2])
+
+    def _with_labels(self, drawn: Drawn, axes: np.ndarray) -> np.ndarray:
+        """What is to be in view in the camera's axes; labels as wide as they will be about."""
+        local = drawn.points @ axes.T
+        distance = self._distance(extremes(local, self._window))
+        boxes = [
+            axes @ point + distance * self._window.pixel * np.array([side * CHARACTER * n, up, 0.0])
+            for point, n in drawn.labels
+            for side in (-1.0, 1.0)
+            for up in (-LINE, LINE)
+        ]
+        return np.concatenate([local, boxes]) if boxes else local
+
+    def _move(self) -> None:
+        assert self._at is not None
+        middle = 0.5 * (self._reach[5] - self._reach[4])
+        ahead = np.array([0.0, 0.0, middle - self._at[2]])
+        pose = np.array([self._at, self._at + ahead]) @ self._axes
+        self._poses.append(pose)
+        self._client.camera.position, self._client.camera.look_at = pose
+
+    def _pose(self) -> np.ndarray:
+        """(2, 3): position and the point looked at [m]."""
+        camera = self._client.camera
+        return np.array([camera.position, camera.look_at])
+
+    def _held(self) -> bool:
+        """Whether the viewer stands where it was never put: a hand has moved it."""
+        now = self._pose()
+        near = SAME * float(np.linalg.norm(now[0] - now[1]))
+        return all(np.abs(now - pose).max() > near for pose in self._poses)
+
+
+class Cameras:
+    """Those of all who look."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._cameras: dict[int, Camera] = {}
+        self._axes = np.eye(3)
+        self._points: list[np.ndarray] = []
+        self._labels: list[tuple[np.ndarray, int]] = []
+        server.initial_camera.fov = FOV
+
+    def look(self, position: ArrayLike, look_at: ArrayLike) -> None:
+        """From where a lab wants to be looked at: two (3,) points [m]."""
+        axes = camera_axes(position, look_at)
+        if not np.array_equal(axes, self._axes):
+            self._axes = axes
+            self._server.initial_camera.position = np.asarray(position, float)
+            self._server.initial_camera.look_at = np.asarray(look_at, float)
+
+    def see(self, points: np.ndarray) -> None:
+        """Points (..., 3) [m] of this frame that are to be in view."""
+        self._points.append(points.reshape(-1, 3))
+
+    def see_ball(self, center: ArrayLike, radius: float) -> None:
+        """A ball: center (3,) [m], radius [m]."""
+        self._points.append(np.asarray(center, float) + radius * CORNERS)
+
+    def see_label(self, point: np.ndarray, text: str) -> None:
+        """A label at a point (3,) [m]."""
+        self._labels.append((point, len(text)))
+
+    def release(self) -> None:
+        """Every camera begins anew, whoever has moved it."""
+        for camera in self._cameras.values():
+            camera.release()
+
+    def follow(self, *, restarted: bool) -> None:
+        """Places the cameras for what was seen since the last call."""
+        drawn = Drawn(np.concatenate(self._points or [np.empty((0, 3))]), self._labels)
+        self._points, self._labels = [], []
+        clients = self._server.get_clients()
+        self._cameras = {i: self._cameras.get(i) or Camera(client) for i, client in clients.items()}
+        for camera in self._cameras.values():
+            camera.follow(drawn, self._axes, restarted=restarted)
+
+    def metres_per_pixel(self, point: np.ndarray) -> float:
+        """At a point (3,) [m], for whom a pixel is the largest there; 0 where nobody looks."""
+        return max((c.metres_per_pixel(point) for c in self._cameras.values()), default=0.0)

@@ -190,6 +190,15 @@ class NullScene:
         self.names.append(name)
 
 
+def arc_point(center: ArrayLike, axis: ArrayLike, angle: ArrayLike, radius: float) -> np.ndarray:
+    """(..., 3) [m]: where `Scene.arc` is after angles (...) [rad] about its axis."""
+    z: np.ndarray = np.asarray(axis, float) / np.linalg.norm(axis)
+    x = np.cross(z, [0.0, 0.0, 1.0] if abs(z[2]) < 0.9 else [1.0, 0.0, 0.0])
+    x /= np.linalg.norm(x)
+    turned = np.multiply.outer(np.cos(angle), x) + np.multiply.outer(np.sin(angle), np.cross(z, x))
+    return np.asarray(np.asarray(center, float) + radius * turned)
+
+
 def cell_at(
     point: ArrayLike, origin: ArrayLike, size: float, rows: int, columns: int
 ) -> tuple[int, int] | None:

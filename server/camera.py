@@ -118,6 +118,15 @@ class Camera:
         """Forgets that a hand has moved it, and begins anew."""
         self._at = None
 
+    def project(self, points: np.ndarray) -> np.ndarray | None:
+        """(k, 2) [px, to the right and up, from the middle] of points (k, 3) [m]; None for a
+        window that is not there yet."""
+        if not self._window.height:
+            return None
+        position, look_at = self._pose()
+        local = (points - position) @ camera_axes(position, look_at).T
+        return np.asarray(local[:, :2] / np.maximum(local[:, 2:], 1e-3) / self._window.pixel)
+
     def follow(self, drawn: Drawn, axes: np.ndarray, *, restarted: bool) -> None:
         """Moves the camera to where all that is drawn, and was since the beginning, is in view."""
         camera = self._client.camera
@@ -192,7 +201,10 @@ class Cameras:
         self._cameras: dict[int, Camera] = {}
         self._axes = np.eye(3)
         self._points: list[np.ndarray] = []
+        self._solid: list[np.ndarray] = []
         self._labels: list[tuple[np.ndarray, int]] = []
+        self.solid = np.empty((0, 3))
+        """(k, 3) [m]: the solid points of the last frame."""
         server.initial_camera.fov = FOV
 
     def look(self, position: ArrayLike, look_at: ArrayLike) -> None:
@@ -203,9 +215,12 @@ class Cameras:
             self._server.initial_camera.position = np.asarray(position, float)
             self._server.initial_camera.look_at = np.asarray(look_at, float)
 
-    def see(self, points: np.ndarray) -> None:
-        """Points (..., 3) [m] of this frame that are to be in view."""
+    def see(self, points: np.ndarray, *, solid: bool = False) -> None:
+        """Points (..., 3) [m] of this frame that are to be in view; `solid` ones are on what
+        a label had better not hide."""
         self._points.append(points.reshape(-1, 3))
+        if solid:
+            self._solid.append(points)
 
     def see_ball(self, center: ArrayLike, radius: float) -> None:
         """A ball: center (3,) [m], radius [m]."""
@@ -223,11 +238,17 @@ class Cameras:
     def follow(self, *, restarted: bool) -> None:
         """Places the cameras for what was seen since the last call."""
         drawn = Drawn(np.concatenate(self._points or [np.empty((0, 3))]), self._labels)
-        self._points, self._labels = [], []
+        self.solid = np.concatenate(self._solid or [self.solid[:0]])
+        self._points, self._solid, self._labels = [], [], []
         clients = self._server.get_clients()
         self._cameras = {i: self._cameras.get(i) or Camera(client) for i, client in clients.items()}
         for camera in self._cameras.values():
             camera.follow(drawn, self._axes, restarted=restarted)
+
+    def project(self, points: np.ndarray) -> np.ndarray | None:
+        """(k, 2) [px] where the first who looks sees points (k, 3) [m]; None where nobody does."""
+        camera = next(iter(self._cameras.values()), None)
+        return camera.project(points) if camera else None
 
     def metres_per_pixel(self, point: np.ndarray) -> float:
         """At a point (3,) [m], for whom a pixel is the largest there; 0 where nobody looks."""

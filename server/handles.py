@@ -15,13 +15,16 @@ STEP = 1.15
 
 
 class HandleNode(Node):
-    """A ball that sends where it is dragged."""
+    """A ball that sends where it is dragged: as large as a hand needs it, with a core."""
 
     def __init__(
         self, server: viser.ViserServer, path: str, name: str, radius: float, mailbox: Mailbox
     ) -> None:
         ball = server.scene.add_icosphere(
-            path, radius, color=COLORS["force"], opacity=0.35, cast_shadow=False
+            path, radius, color=COLORS["force"], opacity=0.25, cast_shadow=False
+        )
+        server.scene.add_icosphere(
+            f"{path}/core", 0.5 * radius, color=COLORS["force"], opacity=0.8, cast_shadow=False
         )
 
         # Asynchronous: these run in order on Viser's event loop.

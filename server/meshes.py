@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
+from labs.scene import arc_point
 from labs.shapes import Box, Cylinder, Sphere, Visual
 
 Triangles = tuple[np.ndarray, np.ndarray]
@@ -49,15 +50,10 @@ def ball() -> Triangles:
 
 def arc_with_head(center: np.ndarray, axis: np.ndarray, angle: float, radius: float) -> np.ndarray:
     """Segments (k, 2, 3) of an arc about `axis`, with an arrow's head where it ends."""
-    axis = axis / np.linalg.norm(axis)
-    x = np.cross(axis, [0.0, 0.0, 1.0] if abs(axis[2]) < 0.9 else [1.0, 0.0, 0.0])
-    x /= np.linalg.norm(x)
-    y = np.cross(axis, x)
     turns = np.linspace(0.0, angle, 25)
-    points = center + radius * (np.outer(np.cos(turns), x) + np.outer(np.sin(turns), y))
+    points = arc_point(center, axis, turns, radius)
     back = turns[-1] - np.sign(angle) * min(0.3, abs(angle) / 2)
-    barbs = [r * (np.cos(back) * x + np.sin(back) * y) for r in (0.85 * radius, 1.15 * radius)]
-    head = [[points[-1], center + barb] for barb in barbs]
+    head = [[points[-1], arc_point(center, axis, back, r * radius)] for r in (0.85, 1.15)]
     return np.concatenate([np.stack([points[:-1], points[1:]], 1), head]).astype(np.float32)
 
 
@@ -66,9 +62,10 @@ def _corners(
     path: str, scale: tuple[float, float, float], shape: Box | Cylinder | Sphere | None
 ) -> np.ndarray:
     """(k, 3) [m]: the vertices that reach farthest along 26 directions."""
-    vertices, _ = _triangles(path, scale, shape)
+    vertices = _triangles(path, scale, shape)[0].astype(float)
     ways = np.array([way for way in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
-    return vertices[np.unique(np.argmax(vertices @ ways.T, axis=0))].astype(float)
+    farthest: np.ndarray = vertices[np.unique(np.argmax(vertices @ ways.T, axis=0))]
+    return farthest
 
 
 @cache

@@ -20,6 +20,7 @@ from server import meshes
 from server.boards import CellsNode, SurfaceNode
 from server.camera import Cameras
 from server.handles import HandleNode
+from server.labels import LabelNode, arrange_nodes
 from server.mailbox import Mailbox
 from server.messages import View
 from server.nodes import COLORS, ArmNode, Node, blend_with_background
@@ -27,6 +28,8 @@ from server.surroundings import show_surroundings
 
 TRAIL_EVERY = 3
 """Frames between two updates of a trail or of many arrows: they are long messages."""
+LABELS_EVERY = 12
+"""Frames between two looks at where labels stand."""
 
 
 class ViserScene:
@@ -35,7 +38,7 @@ class ViserScene:
     def __init__(self, server: viser.ViserServer, mailbox: Mailbox, view: View) -> None:
         self._server, self._mailbox = server, mailbox
         self._nodes: dict[str, Node] = {}
-        self._drawn: set[str] = set()
+        self._drawn: dict[str, None] = {}  # in the order drawn
         self._frame = 0
         self._run = 0
         self._made: Counter[str] = Counter()
@@ -61,6 +64,8 @@ class ViserScene:
             for name, node in self._nodes.items():
                 node.show(name in self._drawn)
             self._cameras.follow(restarted=world.runs != self._run)
+            if self._frame % LABELS_EVERY == 0:
+                arrange_nodes((self._nodes[name] for name in self._drawn), self._cameras)
         self._run = world.runs
         self._frame += 1
 
@@ -88,7 +93,7 @@ class ViserScene:
         )
         assert isinstance(node, ArmNode)
         node.move(q)
-        self._cameras.see(node.outline())
+        self._cameras.see(node.outline(), solid=True)
         if effort is not None:
             node.rings(effort)
 
@@ -107,19 +112,7 @@ class ViserScene:
     def arrow(self, name: str, start: ArrayLike, end: ArrayLike, color: Color = "force") -> None:
         points = np.array([[_three(start), _three(end)]], np.float32)
 
-        def make(path: str) -> Node:
-            return Node(
-                self._server.scene.add_arrows(
-                    path,
-                    points,
-                    COLORS[color],
-                    shaft_radius=0.012,
-                    head_radius=0.03,
-                    head_length=0.07,
-                )
-            )
-
-        self._node(name, color, make).send("points", points)
+        self._arrows(name, points, color, 0.07).send("points", points)
         self._cameras.see(points)
 
     def sphere(self, name: str, center: ArrayLike, radius: float, color: Color = "actual") -> None:
@@ -192,13 +185,10 @@ class ViserScene:
         self._cameras.see_ball(point, radius)
 
     def label(self, name: str, text: str, position: ArrayLike) -> None:
-        def make(path: str) -> Node:
-            return Node(self._server.scene.add_label(path, text))
-
-        node = self._node(name, "label", make)
-        node.send("text", text)
-        node.place(np.asarray(position))
-        self._cameras.see_label(np.asarray(position, float), text)
+        node = self._node(name, "label", lambda path: LabelNode(self._server, path, text))
+        assert isinstance(node, LabelNode)
+        node.write(text, np.asarray(position, float))
+        self._cameras.see_label(node.point, text)
 
     def cells(
         self,
@@ -243,19 +233,7 @@ class ViserScene:
         # A head by steps of its size: the longest arrow may change a little each frame.
         head = 0.35 * 1.25 ** round(math.log(float(lengths.max()), 1.25))
 
-        def make(path: str) -> Node:
-            return Node(
-                self._server.scene.add_arrows(
-                    path,
-                    points,
-                    COLORS[color],
-                    shaft_radius=0.15 * head,
-                    head_radius=0.4 * head,
-                    head_length=head,
-                )
-            )
-
-        node = self._node(name, (color, head), make)
+        node = self._arrows(name, points, color, head)
         self._cameras.see(points)
         if self._frame % TRAIL_EVERY == 0:
             node.send("points", points)
@@ -272,7 +250,7 @@ class ViserScene:
             number, self._made[name] = self._made[name], self._made[name] + 1
             node = self._nodes[name] = make(f"/{name} {number}" if number else f"/{name}")
             node.appearance = appearance
-        self._drawn.add(name)
+        self._drawn[name] = None
         return node
 
     def _lines(self, name: str, segments: np.ndarray, color: np.ndarray, thickness: float) -> Node:
@@ -286,6 +264,13 @@ class ViserScene:
         node = self._node(name, thickness, make)
         node.send("colors", color)
         return node
+
+    def _arrows(self, name: str, points: np.ndarray, color: Color, head: float) -> Node:
+        def make(path: str) -> Node:
+            size = {"shaft_radius": 0.18 * head, "head_radius": 0.45 * head, "head_length": head}
+            return Node(self._server.scene.add_arrows(path, points, COLORS[color], **size))
+
+        return self._node(name, (color, head), make)
 
     def _clear(self) -> None:
         for node in self._nodes.values():

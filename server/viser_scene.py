@@ -267,8 +267,16 @@ class ViserScene:
 
     def _arrows(self, name: str, points: np.ndarray, color: Color, head: float) -> Node:
         def make(path: str) -> Node:
-            size = {"shaft_radius": 0.18 * head, "head_radius": 0.45 * head, "head_length": head}
-            return Node(self._server.scene.add_arrows(path, points, COLORS[color], **size))
+            return Node(
+                self._server.scene.add_arrows(
+                    path,
+                    points,
+                    COLORS[color],
+                    shaft_radius=0.18 * head,
+                    head_radius=0.45 * head,
+                    head_length=head,
+                )
+            )
 
         return self._node(name, (color, head), make)
 

@@ -56,6 +56,7 @@ const actions = {
   share: () => copy(new URL(link, location.href).href, "Link copied: it opens this lab with these parameters."),
   command: copyCommand,
   full: () => fullScreen(),
+  view: () => send({ command: "reset_view" }),
   help: () => document.getElementById("help").showModal(),
   experiment: (i) => experiments.start(i),
 };

@@ -9,6 +9,7 @@ import viser
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from labs.models.arms import load
 from server.mailbox import Mailbox
 from server.messages import View
 from server.nodes import COLORS, DARK, LIGHT, blend_with_background
@@ -151,6 +152,32 @@ def test_a_trail_fades_without_being_made_anew() -> None:
             shown = node._handle.colors
             assert shown.tolist() == blend_with_background("actual", strength, dark=True).tolist()
         assert scene._nodes["echo"] is node
+    finally:
+        server.stop()
+
+
+def test_a_robot_in_anothers_place_has_nodes_of_its_own() -> None:
+    """A viewer keeps the pose of a node that is removed and made again at once, and is not told a
+    pose that is a node's default: the base of a UR5 hung where that of a pendulum had been."""
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+
+    def nodes() -> set[str]:
+        there = server.scene._handle_from_node_name
+        return {name for name in there if name.startswith("/robot")}
+
+    try:
+        scene = ViserScene(server, Mailbox(), View(graphics="low"))
+        past: set[str] = set()
+        for arm in (load("double-pendulum"), load("ur5"), load("double-pendulum")):
+            for ghost in (False, True):
+                scene.arm("robot", arm, arm.home, ghost=ghost)
+                assert nodes()
+                assert not nodes() & past
+                past |= nodes()
+        scene.set_view(View(dark=True, graphics="low"))
+        scene.arm("robot", arm, arm.home)
+        assert nodes()
+        assert not nodes() & past
     finally:
         server.stop()
 

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 FOV = np.radians(35.0)
 """Of the whole height: narrow, so that near and far parts are of similar size."""
-PANEL, BUTTONS, MARGIN = 46, 10, 14
+PANEL, BUTTONS, MARGIN = 46, 24, 12
 """[px] that the folded panel takes on the right, the buttons at the bottom, and air around."""
 NARROW = 500
 """[px] Where a window is no wider, the panel lies below."""

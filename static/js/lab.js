@@ -1,5 +1,6 @@
 // The lab page: joins the session with everything that shows it or changes it.
 
+import { describeScene } from "./describe.js";
 import { Experiments } from "./experiments.js";
 import { tidyFrame } from "./frame.js";
 import { wireKeyboard } from "./keyboard.js";
@@ -189,6 +190,7 @@ document.getElementById("help").addEventListener("click", (event) => {
 });
 
 session.frame.addEventListener("load", () => tidyFrame(session.frame));
+describeScene(document.getElementById("scene-words"));
 wirePreferences();
 wireMenus();
 wireTips(lab, (name) => knobs.values[name] ?? lab.params.find((p) => p.name === name).default);

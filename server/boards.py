@@ -118,9 +118,7 @@ class SurfaceNode(Node):
 def exposure(view: View) -> float:
     """How much brighter the scene's light makes a colour (linear): a value's colour is made so
     much darker, to be about the one its legend shows."""
-    if view.graphics == "low":
-        return 1.5
-    return 2.7 if view.dark else 3.6
+    return 1.5 if view.graphics == "low" else 2.7
 
 
 def glb(points: np.ndarray, colors: np.ndarray, exposure: float) -> bytes:

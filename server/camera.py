@@ -19,10 +19,14 @@ from numpy.typing import ArrayLike
 
 FOV = np.radians(35.0)
 """Of the whole height: narrow, so that near and far parts are of similar size."""
-PANEL, BUTTONS, MARGIN = 46, 24, 12
-"""[px] that the folded panel takes on the right, the buttons at the bottom, and air around."""
-NARROW = 500
-"""[px] Where a window is no wider, the panel lies below."""
+PANEL, BUTTONS, SHEET, MARGIN = 46, 24, 44, 12
+"""[px] that the folded panel takes on the right, the buttons at the bottom, both at the bottom of a
+narrow window, and air around."""
+NARROW, UPRIGHT = 1.3, 350
+"""Width over height of a narrow window, a phone's, and its height [px]."""
+LOWEST, HIGHEST = 270, 450
+"""[px] A viewer tells the size of what it draws on, which may be finer than its screen, or coarser
+where it draws slowly: heights beyond these are not believed."""
 ROOM = 1.0
 """What moves is followed to so many times the size of what was there at first: what runs away
 does not shrink the rest."""
@@ -40,10 +44,16 @@ CHARACTER, LINE = 3.6, 18.0
 
 @dataclass(frozen=True)
 class Window:
-    """A viewer's window: its size [px]."""
+    """A viewer's window: its width over its height, and its height [px], about."""
 
-    width: int
-    height: int
+    aspect: float
+    height: float
+
+    @classmethod
+    def of(cls, width: int, height: int) -> "Window":
+        """As a viewer tells it."""
+        aspect = width / height
+        return cls(aspect, UPRIGHT if aspect < NARROW else min(max(height, LOWEST), HIGHEST))
 
     @property
     def pixel(self) -> float:
@@ -53,9 +63,9 @@ class Window:
     @property
     def tangents(self) -> np.ndarray:
         """(4,): of the free part: right, left, top, bottom."""
-        taken = np.array([PANEL if self.width > NARROW else 0, 0, 0, BUTTONS]) + MARGIN
-        half = 0.5 * np.array([self.width, self.width, self.height, self.height])
-        return np.asarray(self.pixel * np.maximum(half - taken, 0.3 * half))
+        taken = (0, 0, 0, SHEET) if self.aspect < NARROW else (PANEL, 0, 0, BUTTONS)
+        half = 0.5 * self.height * np.array([self.aspect, self.aspect, 1.0, 1.0])
+        return np.asarray(self.pixel * (half - taken - MARGIN))
 
 
 def extremes(points: np.ndarray, window: Window) -> np.ndarray:
@@ -102,7 +112,7 @@ class Camera:
 
     def __init__(self, client: viser.ClientHandle) -> None:
         self._client = client
-        self._window = Window(0, 0)
+        self._window = Window(0.0, 0.0)
         self._axes = np.eye(3)
         self._reach = np.zeros(6)
         self._bounds = np.zeros((2, 3))
@@ -130,11 +140,13 @@ class Camera:
     def follow(self, drawn: Drawn, axes: np.ndarray, *, restarted: bool) -> None:
         """Moves the camera to where all that is drawn, and was since the beginning, is in view."""
         camera = self._client.camera
-        window = Window(camera.image_width, camera.image_height)
-        if min(window.width, window.height) < 2 or not len(drawn.points):
+        if min(camera.image_width, camera.image_height) < 2 or not len(drawn.points):
             return
         begins = self._at is None or not np.array_equal(axes, self._axes)
-        resized, self._window = window != self._window, window
+        window = Window.of(camera.image_width, camera.image_height)
+        # One that draws coarser for a while is not another window.
+        resized = abs(window.aspect - self._window.aspect) > 0.02 * window.aspect
+        window = self._window = window if resized else self._window
         if not begins and self._held():
             return
         local = self._with_labels(drawn, axes)

@@ -21,7 +21,7 @@ class HandleNode(Node):
         self, server: viser.ViserServer, path: str, name: str, radius: float, mailbox: Mailbox
     ) -> None:
         ball = server.scene.add_icosphere(
-            path, radius, color=COLORS["force"], opacity=0.25, cast_shadow=False
+            path, radius, color=COLORS["force"], opacity=0.35, cast_shadow=False
         )
         server.scene.add_icosphere(
             f"{path}/core", 0.5 * radius, color=COLORS["force"], opacity=0.8, cast_shadow=False

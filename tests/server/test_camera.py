@@ -48,7 +48,7 @@ def follow(camera: Camera, points: np.ndarray, *, restarted: bool = False) -> No
 
 @pytest.mark.parametrize("size", SIZES)
 def test_the_nearest_camera_that_has_all_in_its_window(size: tuple[int, int]) -> None:
-    window = Window(*size)
+    window = Window.of(*size)
     for seed in range(20):
         points = cloud(seed, 0.1 + seed)
         camera = nearest(extremes(points, window), window)
@@ -136,6 +136,16 @@ def test_another_window_is_fitted_at_once() -> None:
     assert not viewer.shows(points)
     follow(camera, points)
     assert viewer.shows(points)
+
+
+def test_a_viewer_that_draws_coarser_for_a_while_is_left_where_it_is() -> None:
+    viewer, points = Viewer(640, 270), cloud(0)
+    camera = Camera(viewer)  # type: ignore[arg-type]
+    follow(camera, points)
+    fitted = viewer.camera.position
+    viewer.camera.image_width, viewer.camera.image_height = 426, 180
+    follow(camera, 0.5 * points)
+    np.testing.assert_array_equal(viewer.camera.position, fitted)
 
 
 def test_labels_are_in_view_too() -> None:

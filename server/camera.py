@@ -113,6 +113,7 @@ class Camera:
     def __init__(self, client: viser.ClientHandle) -> None:
         self._client = client
         self._window = Window(0.0, 0.0)
+        self._home = np.zeros((2, 3))
         self._axes = np.eye(3)
         self._reach = np.zeros(6)
         self._bounds = np.zeros((2, 3))
@@ -137,24 +138,30 @@ class Camera:
         local = (points - position) @ camera_axes(position, look_at).T
         return np.asarray(local[:, :2] / np.maximum(local[:, 2:], 1e-3) / self._window.pixel)
 
-    def follow(self, drawn: Drawn, axes: np.ndarray, *, restarted: bool) -> None:
-        """Moves the camera to where all that is drawn, and was since the beginning, is in view."""
+    def follow(self, drawn: Drawn, home: np.ndarray, *, restarted: bool) -> None:
+        """Moves the camera to where all that is drawn, and was since the beginning, is in view, in
+        the direction of `home`, (2, 3) [m]: a position and the point looked at. A viewer stands
+        there at first, and when it resets its view by itself."""
         camera = self._client.camera
         if min(camera.image_width, camera.image_height) < 2 or not len(drawn.points):
             return
-        begins = self._at is None or not np.array_equal(axes, self._axes)
         window = Window.of(camera.image_width, camera.image_height)
         # One that draws coarser for a while is not another window.
         resized = abs(window.aspect - self._window.aspect) > 0.02 * window.aspect
         window = self._window = window if resized else self._window
-        if not begins and self._held():
-            return
-        local = self._with_labels(drawn, axes)
+        if not np.array_equal(home, self._home):
+            self._home, self._axes = home, camera_axes(*home)
+            self._at = None
+        elif self._is_at(home):
+            self._at = None
+        elif self._at is not None and not any(map(self._is_at, self._poses)):
+            return  # a hand has moved it
+        begins = self._at is None
+        local = self._with_labels(drawn, self._axes)
         if begins or resized:
             low, high = local.min(axis=0), local.max(axis=0)
             room = ROOM * float((high - low).max())
             self._bounds = np.array([low - room, high + room])
-            self._axes = axes
         reach = extremes(np.clip(local, *self._bounds), window)
         if restarted and not begins:
             begins = self._distance(reach) < WORTH_IT * self._distance(self._reach)
@@ -198,11 +205,10 @@ class Camera:
         camera = self._client.camera
         return np.array([camera.position, camera.look_at])
 
-    def _held(self) -> bool:
-        """Whether the viewer stands where it was never put: a hand has moved it."""
-        now = self._pose()
-        near = SAME * float(np.linalg.norm(now[0] - now[1]))
-        return all(np.abs(now - pose).max() > near for pose in self._poses)
+    def _is_at(self, pose: np.ndarray) -> bool:
+        """Whether the viewer stands at a pose (2, 3) [m]."""
+        near = SAME * float(np.linalg.norm(pose[0] - pose[1]))
+        return bool(np.abs(self._pose() - pose).max() < near)
 
 
 class Cameras:
@@ -211,7 +217,7 @@ class Cameras:
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
         self._cameras: dict[int, Camera] = {}
-        self._axes = np.eye(3)
+        self._home = np.array([[3.0, 3.0, 3.0], [0.0, 0.0, 0.0]])
         self._points: list[np.ndarray] = []
         self._solid: list[np.ndarray] = []
         self._labels: list[tuple[np.ndarray, int]] = []
@@ -221,11 +227,10 @@ class Cameras:
 
     def look(self, position: ArrayLike, look_at: ArrayLike) -> None:
         """From where a lab wants to be looked at: two (3,) points [m]."""
-        axes = camera_axes(position, look_at)
-        if not np.array_equal(axes, self._axes):
-            self._axes = axes
-            self._server.initial_camera.position = np.asarray(position, float)
-            self._server.initial_camera.look_at = np.asarray(look_at, float)
+        home = np.array([position, look_at], float)
+        if not np.array_equal(home, self._home):
+            self._home = home
+            self._server.initial_camera.position, self._server.initial_camera.look_at = home
 
     def see(self, points: np.ndarray, *, solid: bool = False) -> None:
         """Points (..., 3) [m] of this frame that are to be in view; `solid` ones are on what
@@ -255,7 +260,7 @@ class Cameras:
         clients = self._server.get_clients()
         self._cameras = {i: self._cameras.get(i) or Camera(client) for i, client in clients.items()}
         for camera in self._cameras.values():
-            camera.follow(drawn, self._axes, restarted=restarted)
+            camera.follow(drawn, self._home, restarted=restarted)
 
     def project(self, points: np.ndarray) -> np.ndarray | None:
         """(k, 2) [px] where the first who looks sees points (k, 3) [m]; None where nobody does."""

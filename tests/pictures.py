@@ -67,9 +67,9 @@ def _shot(page: Page) -> Image.Image:
 
 
 def _card(shot: Image.Image) -> Image.Image:
-    """The middle of the scene without its panel, in a card's proportions."""
+    """The scene without its panel, in a card's proportions."""
     width, height = shot.width - PANEL, shot.height
-    scale = min(width / CARD[0], height / CARD[1]) * 0.8
+    scale = min(width / CARD[0], height / CARD[1])
     w, h = CARD[0] * scale, CARD[1] * scale
     left, top = (width - w) / 2, (height - h) / 2
     box = (left, top, left + w, top + h)

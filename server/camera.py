@@ -32,8 +32,10 @@ ROOM = 1.0
 does not shrink the rest."""
 GLIDE = 0.12
 """The part of the way to its place that the camera goes in a frame."""
+MEMORY = 240
+"""Frames for which what was in view keeps its place, and up to twice as many."""
 WORTH_IT = 0.75
-"""A restart moves the camera if it comes nearer than this part of its distance."""
+"""The camera comes nearer again if it can, to this part of its distance."""
 SAME = 2e-3
 """Poses that differ by less, in parts of the distance, are one."""
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) / np.sqrt(3.0)
@@ -115,7 +117,8 @@ class Camera:
         self._window = Window(0.0, 0.0)
         self._home = np.zeros((2, 3))
         self._axes = np.eye(3)
-        self._reach = np.zeros(6)
+        self._reach = self._latest = self._before = np.zeros(6)
+        self._frames = 0
         self._bounds = np.zeros((2, 3))
         self._at: np.ndarray | None = None
         self._poses: deque[np.ndarray] = deque([self._pose()], maxlen=300)
@@ -166,7 +169,9 @@ class Camera:
         if restarted and not begins:
             begins = self._distance(reach) < WORTH_IT * self._distance(self._reach)
         jumps = begins or resized
-        self._reach = reach if jumps else np.maximum(reach, self._reach)
+        if jumps:
+            self._reach = self._latest = self._before = reach
+        self._remember(reach)
         goal = nearest(self._reach, window)
         if jumps or self._at is None:
             self._at = goal
@@ -175,6 +180,17 @@ class Camera:
         else:
             self._at = self._at + GLIDE * (goal - self._at)
         self._move()
+
+    def _remember(self, reach: np.ndarray) -> None:
+        """Extremes of this frame. A plan's first guesses may reach far, and never again."""
+        self._reach = np.maximum(reach, self._reach)
+        self._latest = np.maximum(reach, self._latest)
+        self._frames += 1
+        if self._frames % MEMORY == 0:
+            lately = np.maximum(self._latest, self._before)
+            if self._distance(lately) < WORTH_IT * self._distance(self._reach):
+                self._reach = lately
+            self._before, self._latest = self._latest, reach
 
     def _distance(self, reach: np.ndarray) -> float:
         """[m] from the camera to the middle of what is in view."""

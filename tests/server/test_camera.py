@@ -6,7 +6,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from server.camera import CHARACTER, FOV, Camera, Drawn, Window, camera_axes, extremes, nearest
+from server.camera import (
+    CHARACTER,
+    FOV,
+    MEMORY,
+    Camera,
+    Drawn,
+    Window,
+    camera_axes,
+    extremes,
+    nearest,
+)
 
 SIZES = ((640, 270), (660, 360), (390, 350), (1366, 650))
 HOME = np.array([[1.0, -1.0, 0.8], [0.0, 0.0, 0.3]])
@@ -129,6 +139,16 @@ def test_a_restart_moves_the_camera_only_if_it_is_worth_it() -> None:
     np.testing.assert_array_equal(viewer.camera.position, fitted)
     follow(camera, 0.5 * points, restarted=True)
     assert np.linalg.norm(viewer.camera.position) < 0.75 * np.linalg.norm(fitted)
+
+
+def test_what_went_far_once_is_forgotten() -> None:
+    viewer, points = Viewer(640, 270), cloud(0)
+    camera = Camera(viewer)  # type: ignore[arg-type]
+    follow(camera, points)
+    fitted = viewer.camera.position
+    for frame in range(5 * MEMORY):
+        follow(camera, 1.8 * points if frame == MEMORY // 2 else points)
+    np.testing.assert_allclose(viewer.camera.position, fitted, atol=0.02)
 
 
 def test_another_window_is_fitted_at_once() -> None:

@@ -28,8 +28,8 @@ LOWEST, HIGHEST = 270, 450
 """[px] A viewer tells the size of what it draws on, which may be finer than its screen, or coarser
 where it draws slowly: heights beyond these are not believed."""
 ROOM = 1.0
-"""What moves is followed to so many times the size of what was there at first: what runs away
-does not shrink the rest."""
+"""What moves is followed to so many times the size of what was there when something new was drawn:
+what runs away does not shrink the rest."""
 GLIDE = 0.12
 """The part of the way to its place that the camera goes in a frame."""
 MEMORY = 240
@@ -141,10 +141,11 @@ class Camera:
         local = (points - position) @ camera_axes(position, look_at).T
         return np.asarray(local[:, :2] / np.maximum(local[:, 2:], 1e-3) / self._window.pixel)
 
-    def follow(self, drawn: Drawn, home: np.ndarray, *, restarted: bool) -> None:
+    def follow(self, drawn: Drawn, home: np.ndarray, *, changed: bool) -> None:
         """Moves the camera to where all that is drawn, and was since the beginning, is in view, in
         the direction of `home`, (2, 3) [m]: a position and the point looked at. A viewer stands
-        there at first, and when it resets its view by itself."""
+        there at first, and when it resets its view by itself. `changed`: something else is drawn
+        than a frame ago, not only elsewhere."""
         camera = self._client.camera
         if min(camera.image_width, camera.image_height) < 2 or not len(drawn.points):
             return
@@ -161,12 +162,12 @@ class Camera:
             return  # a hand has moved it
         begins = self._at is None
         local = self._with_labels(drawn, self._axes)
-        if begins or resized:
+        if begins or resized or changed:
             low, high = local.min(axis=0), local.max(axis=0)
             room = ROOM * float((high - low).max())
             self._bounds = np.array([low - room, high + room])
         reach = extremes(np.clip(local, *self._bounds), window)
-        if restarted and not begins:
+        if changed and not begins:
             begins = self._distance(reach) < WORTH_IT * self._distance(self._reach)
         jumps = begins or resized
         if jumps:
@@ -268,7 +269,7 @@ class Cameras:
         for camera in self._cameras.values():
             camera.release()
 
-    def follow(self, *, restarted: bool) -> None:
+    def follow(self, *, changed: bool) -> None:
         """Places the cameras for what was seen since the last call."""
         drawn = Drawn(np.concatenate(self._points or [np.empty((0, 3))]), self._labels)
         self.solid = np.concatenate(self._solid or [self.solid[:0]])
@@ -276,7 +277,7 @@ class Cameras:
         clients = self._server.get_clients()
         self._cameras = {i: self._cameras.get(i) or Camera(client) for i, client in clients.items()}
         for camera in self._cameras.values():
-            camera.follow(drawn, self._home, restarted=restarted)
+            camera.follow(drawn, self._home, changed=changed)
 
     def project(self, points: np.ndarray) -> np.ndarray | None:
         """(k, 2) [px] where the first who looks sees points (k, 3) [m]; None where nobody does."""

@@ -40,7 +40,8 @@ class ViserScene:
         self._nodes: dict[str, Node] = {}
         self._drawn: dict[str, None] = {}  # in the order drawn
         self._frame = 0
-        self._run = 0
+        self._shown: list[object] = []
+        """The run that was drawn, and what its bodies and boards looked like."""
         self._made: Counter[str] = Counter()
         self._cameras = Cameras(server)
         server.gui.main_panel.dock_right()
@@ -63,10 +64,12 @@ class ViserScene:
             world.lab.draw(self, world.params, world.state)
             for name, node in self._nodes.items():
                 node.show(name in self._drawn)
-            self._cameras.follow(restarted=world.runs != self._run)
+            drawn = [self._nodes[name] for name in self._drawn]
+            shown = [node.appearance for node in drawn if isinstance(node, ArmNode | CellsNode)]
+            self._cameras.follow(changed=[world.runs, *shown] != self._shown)
             if self._frame % LABELS_EVERY == 0:
-                arrange_nodes((self._nodes[name] for name in self._drawn), self._cameras)
-        self._run = world.runs
+                arrange_nodes(drawn, self._cameras)
+        self._shown = [world.runs, *shown]
         self._frame += 1
 
     def reset_view(self) -> None:

@@ -53,8 +53,8 @@ class Viewer:
         return bool((np.abs(self.pixels(points)) < half).all())
 
 
-def follow(camera: Camera, points: np.ndarray, *, restarted: bool = False) -> None:
-    camera.follow(Drawn(points, []), HOME, restarted=restarted)
+def follow(camera: Camera, points: np.ndarray, *, changed: bool = False) -> None:
+    camera.follow(Drawn(points, []), HOME, changed=changed)
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -104,8 +104,8 @@ def test_a_hand_is_left_alone_until_the_view_is_reset() -> None:
     follow(camera, points)
     fitted = viewer.camera.position
     viewer.camera.position = turned = np.array([-4.0, 1.0, 2.0])
-    for restarted in (False, True):
-        follow(camera, 1.5 * points, restarted=restarted)
+    for changed in (False, True):
+        follow(camera, 1.5 * points, changed=changed)
     viewer.camera.image_width = 900
     follow(camera, points)
     np.testing.assert_array_equal(viewer.camera.position, turned)
@@ -130,14 +130,14 @@ def test_a_camera_that_was_set_back_by_its_viewer_follows_again() -> None:
         viewer.camera.position, viewer.camera.look_at = HOME
 
 
-def test_a_restart_moves_the_camera_only_if_it_is_worth_it() -> None:
+def test_a_change_moves_the_camera_nearer_only_if_it_is_worth_it() -> None:
     viewer, points = Viewer(640, 270), cloud(0)
     camera = Camera(viewer)  # type: ignore[arg-type]
     follow(camera, points)
     fitted = viewer.camera.position
-    follow(camera, 0.9 * points, restarted=True)
+    follow(camera, 0.9 * points, changed=True)
     np.testing.assert_array_equal(viewer.camera.position, fitted)
-    follow(camera, 0.5 * points, restarted=True)
+    follow(camera, 0.5 * points, changed=True)
     assert np.linalg.norm(viewer.camera.position) < 0.75 * np.linalg.norm(fitted)
 
 
@@ -179,5 +179,5 @@ def test_labels_are_in_view_too() -> None:
     half_text = 30 * CHARACTER
     assert viewer.pixels(corner[None])[0, 0] + half_text > 390 / 2
     camera.release()
-    camera.follow(Drawn(points, [(corner, 30)]), HOME, restarted=False)
+    camera.follow(Drawn(points, [(corner, 30)]), HOME, changed=False)
     assert viewer.pixels(corner[None])[0, 0] + half_text < 390 / 2

@@ -40,7 +40,8 @@ class Scene(Protocol):
         self, name: str, points: np.ndarray, color: Color = "actual", strength: float = 1.0
     ) -> None:
         """A polyline through `points` (k, 3) [m]. Of a lower `strength`, in (0, 1], it is paler:
-        so that what was tried before fades behind what is tried now."""
+        so that what was tried before fades behind what is tried now. A muted one may leave the
+        view; all else that is drawn is kept in it."""
         ...
 
     def arrow(self, name: str, start: ArrayLike, end: ArrayLike, color: Color = "force") -> None:

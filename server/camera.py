@@ -10,6 +10,7 @@ has all points in its window follows from one extreme over the points for each s
 moves widens those extremes as it goes."""
 
 import itertools
+import time
 from collections import deque
 from dataclasses import dataclass
 
@@ -32,8 +33,8 @@ ROOM = 1.0
 what runs away does not shrink the rest."""
 GLIDE = 0.12
 """The part of the way to its place that the camera goes in a frame."""
-MEMORY = 240
-"""Frames for which what was in view keeps its place, and up to twice as many."""
+MEMORY = 2.5
+"""[s] for which what was in view keeps its place, and up to twice as long."""
 WORTH_IT = 0.75
 """The camera comes nearer again if it can, to this part of its distance."""
 SAME = 2e-3
@@ -118,7 +119,7 @@ class Camera:
         self._home = np.zeros((2, 3))
         self._axes = np.eye(3)
         self._reach = self._latest = self._before = np.zeros(6)
-        self._frames = 0
+        self._due = 0.0
         self._bounds = np.zeros((2, 3))
         self._at: np.ndarray | None = None
         self._poses: deque[np.ndarray] = deque([self._pose()], maxlen=300)
@@ -141,11 +142,11 @@ class Camera:
         local = (points - position) @ camera_axes(position, look_at).T
         return np.asarray(local[:, :2] / np.maximum(local[:, 2:], 1e-3) / self._window.pixel)
 
-    def follow(self, drawn: Drawn, home: np.ndarray, *, changed: bool) -> None:
+    def follow(self, drawn: Drawn, home: np.ndarray, now: float, *, changed: bool) -> None:
         """Moves the camera to where all that is drawn, and was since the beginning, is in view, in
         the direction of `home`, (2, 3) [m]: a position and the point looked at. A viewer stands
         there at first, and when it resets its view by itself. `changed`: something else is drawn
-        than a frame ago, not only elsewhere."""
+        than a frame ago, not only elsewhere. `now` [s] is of any clock."""
         camera = self._client.camera
         if min(camera.image_width, camera.image_height) < 2 or not len(drawn.points):
             return
@@ -172,7 +173,8 @@ class Camera:
         jumps = begins or resized
         if jumps:
             self._reach = self._latest = self._before = reach
-        self._remember(reach)
+            self._due = now + MEMORY
+        self._remember(reach, now)
         goal = nearest(self._reach, window)
         if jumps or self._at is None:
             self._at = goal
@@ -182,12 +184,12 @@ class Camera:
             self._at = self._at + GLIDE * (goal - self._at)
         self._move()
 
-    def _remember(self, reach: np.ndarray) -> None:
+    def _remember(self, reach: np.ndarray, now: float) -> None:
         """Extremes of this frame. A plan's first guesses may reach far, and never again."""
         self._reach = np.maximum(reach, self._reach)
         self._latest = np.maximum(reach, self._latest)
-        self._frames += 1
-        if self._frames % MEMORY == 0:
+        if now > self._due:
+            self._due = now + MEMORY
             lately = np.maximum(self._latest, self._before)
             if self._distance(lately) < WORTH_IT * self._distance(self._reach):
                 self._reach = lately
@@ -274,10 +276,11 @@ class Cameras:
         drawn = Drawn(np.concatenate(self._points or [np.empty((0, 3))]), self._labels)
         self.solid = np.concatenate(self._solid or [self.solid[:0]])
         self._points, self._solid, self._labels = [], [], []
+        now = time.monotonic()
         clients = self._server.get_clients()
         self._cameras = {i: self._cameras.get(i) or Camera(client) for i, client in clients.items()}
         for camera in self._cameras.values():
-            camera.follow(drawn, self._home, changed=changed)
+            camera.follow(drawn, self._home, now, changed=changed)
 
     def project(self, points: np.ndarray) -> np.ndarray | None:
         """(k, 2) [px] where the first who looks sees points (k, 3) [m]; None where nobody does."""

@@ -108,7 +108,8 @@ class ViserScene:
         segments = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
         mixed = blend_with_background(color, strength, self._view.dark)
         node = self._lines(name, segments, mixed, 2.5)
-        self._cameras.see(points)
+        if color != "muted":
+            self._cameras.see(points)
         if self._frame % TRAIL_EVERY == 0:
             node.send("points", segments)
 

@@ -53,8 +53,8 @@ class Viewer:
         return bool((np.abs(self.pixels(points)) < half).all())
 
 
-def follow(camera: Camera, points: np.ndarray, *, changed: bool = False) -> None:
-    camera.follow(Drawn(points, []), HOME, changed=changed)
+def follow(camera: Camera, points: np.ndarray, *, now: float = 0.0, changed: bool = False) -> None:
+    camera.follow(Drawn(points, []), HOME, now, changed=changed)
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -146,8 +146,9 @@ def test_what_went_far_once_is_forgotten() -> None:
     camera = Camera(viewer)  # type: ignore[arg-type]
     follow(camera, points)
     fitted = viewer.camera.position
-    for frame in range(5 * MEMORY):
-        follow(camera, 1.8 * points if frame == MEMORY // 2 else points)
+    for frame in range(300):
+        now = 3.0 * MEMORY * frame / 200
+        follow(camera, 1.8 * points if frame == 10 else points, now=now)
     np.testing.assert_allclose(viewer.camera.position, fitted, atol=0.02)
 
 
@@ -179,5 +180,5 @@ def test_labels_are_in_view_too() -> None:
     half_text = 30 * CHARACTER
     assert viewer.pixels(corner[None])[0, 0] + half_text > 390 / 2
     camera.release()
-    camera.follow(Drawn(points, [(corner, 30)]), HOME, changed=False)
+    camera.follow(Drawn(points, [(corner, 30)]), HOME, 0.0, changed=False)
     assert viewer.pixels(corner[None])[0, 0] + half_text < 390 / 2

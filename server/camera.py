@@ -159,7 +159,7 @@ class Camera:
             self._at = None
         elif self._is_at(home):
             self._at = None
-        elif self._at is not None and not any(map(self._is_at, self._poses)):
+        elif self._at is not None and not any(map(self._is_at, reversed(self._poses))):
             return  # a hand has moved it
         begins = self._at is None
         local = self._with_labels(drawn, self._axes)
@@ -271,8 +271,9 @@ class Cameras:
         for camera in self._cameras.values():
             camera.release()
 
-    def follow(self, *, changed: bool) -> None:
-        """Places the cameras for what was seen since the last call."""
+    def follow(self, *, changed: bool, held: bool = False) -> None:
+        """Places the cameras for what was seen since the last call; not while a hand has `held` of
+        something, which would slip away under it."""
         drawn = Drawn(np.concatenate(self._points or [np.empty((0, 3))]), self._labels)
         self.solid = np.concatenate(self._solid or [self.solid[:0]])
         self._points, self._solid, self._labels = [], [], []
@@ -280,7 +281,8 @@ class Cameras:
         clients = self._server.get_clients()
         self._cameras = {i: self._cameras.get(i) or Camera(client) for i, client in clients.items()}
         for camera in self._cameras.values():
-            camera.follow(drawn, self._home, now, changed=changed)
+            if not held:
+                camera.follow(drawn, self._home, now, changed=changed)
 
     def project(self, points: np.ndarray) -> np.ndarray | None:
         """(k, 2) [px] where the first who looks sees points (k, 3) [m]; None where nobody does."""

@@ -27,10 +27,12 @@ class HandleNode(Node):
             f"{path}/core", 0.5 * radius, color=COLORS["force"], opacity=0.8, cast_shadow=False
         )
 
+        self.held = False
+
         # Asynchronous: these run in order on Viser's event loop.
         async def dragged(event: Any) -> None:
-            held = event.phase != "end"
-            point = tuple(map(float, event.end_position)) if held else None
+            self.held = event.phase != "end"
+            point = tuple(map(float, event.end_position)) if self.held else None
             mailbox.put("hold", handle=name, point=point)
 
         ball.on_drag("left")(dragged)

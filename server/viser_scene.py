@@ -66,7 +66,8 @@ class ViserScene:
                 node.show(name in self._drawn)
             drawn = [self._nodes[name] for name in self._drawn]
             shown = [node.appearance for node in drawn if isinstance(node, ArmNode | CellsNode)]
-            self._cameras.follow(changed=[world.runs, *shown] != self._shown)
+            held = any(node.held for node in drawn if isinstance(node, HandleNode))
+            self._cameras.follow(changed=[world.runs, *shown] != self._shown, held=held)
             if self._frame % LABELS_EVERY == 0:
                 arrange_nodes(drawn, self._cameras)
         self._shown = [world.runs, *shown]

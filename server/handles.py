@@ -23,8 +23,8 @@ class HandleNode(Node):
         ball = server.scene.add_icosphere(
             path, radius, color=COLORS["force"], opacity=0.35, cast_shadow=False
         )
-        server.scene.add_icosphere(
-            f"{path}/core", 0.5 * radius, color=COLORS["force"], opacity=0.8, cast_shadow=False
+        core = server.scene.add_icosphere(
+            f"{path}/core", 0.45 * radius, color=COLORS["force"], cast_shadow=False
         )
 
         self.held = False
@@ -37,9 +37,11 @@ class HandleNode(Node):
 
         ball.on_drag("left")(dragged)
         super().__init__(ball)
-        self._radius = radius
+        self._core, self._radius = Node(core), radius
 
     def keep_reachable(self, metres_per_pixel: float) -> None:
         """Never smaller than a hand can hit."""
         wanted = max(1.0, SMALLEST * metres_per_pixel / self._radius)
-        self.send("scale", STEP ** math.ceil(math.log(wanted, STEP)))
+        scale = STEP ** math.ceil(math.log(wanted, STEP))
+        self.send("scale", scale)
+        self._core.send("scale", scale)

@@ -15,7 +15,7 @@ from server.messages import View
 from server.nodes import COLORS, DARK, LIGHT, blend_with_background
 from server.viser_scene import ViserScene
 from tests.served import Served
-from tests.viser_client import PROTOCOL, SceneClient, message
+from tests.viser_client import PROTOCOL, SceneClient, camera, message
 
 
 def test_the_viewers_script_comes_after_the_element_it_draws_in(served: Served) -> None:
@@ -29,6 +29,18 @@ def test_the_viewers_script_comes_after_the_element_it_draws_in(served: Served) 
     (root,) = (found.start() for found in re.finditer('<div id="root"></div>', whole))
     assert whole.index("/static/css/scene.css") < whole.index("</head>") < root < script
     assert whole[whole.index("</script>") :].split() == ["</script></body>", "</html>"]
+
+
+def test_a_view_is_reset_after_a_hand_has_moved_it(served: Served) -> None:
+    with served.session("oscillator") as session, SceneClient(session) as scene:
+        session.command("pause")
+        scene.socket.send(camera((9.0, 9.0, 9.0)))
+        scene.skip(0.2)
+        session.command("reset_view")
+        placed = scene.read_until(
+            lambda m: m["type"] == "SetCameraPositionMessage" and not m["initial"]
+        )
+        assert np.linalg.norm(placed["position"]) < 6.0
 
 
 def test_the_robot_is_a_tree_of_its_joints(served: Served) -> None:

@@ -251,16 +251,17 @@ class Cameras:
             self._home = home
             self._server.initial_camera.position, self._server.initial_camera.look_at = home
 
-    def see(self, points: np.ndarray, *, solid: bool = False) -> None:
-        """Points (..., 3) [m] of this frame that are to be in view; `solid` ones are on what
-        a label had better not hide."""
+    def see(self, points: np.ndarray) -> None:
+        """Points (..., 3) [m] of this frame that are to be in view."""
         self._points.append(points.reshape(-1, 3))
-        if solid:
-            self._solid.append(points)
 
     def see_ball(self, center: ArrayLike, radius: float) -> None:
         """A ball: center (3,) [m], radius [m]."""
         self._points.append(np.asarray(center, float) + radius * CORNERS)
+
+    def avoid(self, points: np.ndarray) -> None:
+        """Points (k, 3) [m] on what a label had better not hide."""
+        self._solid.append(points)
 
     def see_label(self, point: np.ndarray, text: str) -> None:
         """A label at a point (3,) [m]."""

@@ -39,9 +39,10 @@ class HandleNode(Node):
         super().__init__(ball)
         self._core, self._radius = Node(core), radius
 
-    def keep_reachable(self, metres_per_pixel: float) -> None:
-        """Never smaller than a hand can hit."""
+    def keep_reachable(self, metres_per_pixel: float) -> float:
+        """Never smaller than a hand can hit. Its radius [m] now."""
         wanted = max(1.0, SMALLEST * metres_per_pixel / self._radius)
         scale = STEP ** math.ceil(math.log(wanted, STEP))
         self.send("scale", scale)
         self._core.send("scale", scale)
+        return self._radius * scale

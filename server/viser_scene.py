@@ -18,7 +18,7 @@ from labs.scene import Color, cell_centers
 from labs.shapes import Body
 from server import meshes
 from server.boards import CellsNode, SurfaceNode
-from server.camera import Cameras
+from server.camera import CORNERS, Cameras
 from server.handles import HandleNode
 from server.labels import LabelNode, arrange_nodes
 from server.mailbox import Mailbox
@@ -97,7 +97,9 @@ class ViserScene:
         )
         assert isinstance(node, ArmNode)
         node.move(q)
-        self._cameras.see(node.outline(), solid=True)
+        outline = node.outline()
+        self._cameras.see(outline)
+        self._cameras.avoid(outline)
         if effort is not None:
             node.rings(effort)
 
@@ -186,8 +188,9 @@ class ViserScene:
         assert isinstance(node, HandleNode)
         point = np.asarray(position, float)
         node.place(point)
-        node.keep_reachable(self._cameras.metres_per_pixel(point))
+        shown = node.keep_reachable(self._cameras.metres_per_pixel(point))
         self._cameras.see_ball(point, radius)
+        self._cameras.avoid(point + shown * CORNERS)
 
     def label(self, name: str, text: str, position: ArrayLike) -> None:
         node = self._node(name, "label", lambda path: LabelNode(self._server, path, text))

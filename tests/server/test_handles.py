@@ -12,8 +12,8 @@ def test_a_ball_is_never_too_small_to_hit() -> None:
     try:
         node = HandleNode(server, "/pull", "pull", 0.05, Mailbox())
         for metres_per_pixel in (0.0, 0.001, 0.004, 0.03):
-            node.keep_reachable(metres_per_pixel)
-            shown = 0.05 * node._handle.scale
+            shown = node.keep_reachable(metres_per_pixel)
+            assert shown == pytest.approx(0.05 * node._handle.scale)
             wanted = max(0.05, SMALLEST * metres_per_pixel)
             assert wanted == pytest.approx(shown) or wanted < shown < 1.01 * STEP * wanted
     finally:

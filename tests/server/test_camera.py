@@ -6,17 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from server.camera import (
-    CHARACTER,
-    FOV,
-    MEMORY,
-    Camera,
-    Drawn,
-    Window,
-    camera_axes,
-    extremes,
-    nearest,
-)
+from server.camera import CHARACTER, MEMORY, Camera, Drawn
+from server.framing import FOV, Window, camera_axes, extremes, nearest
 
 SIZES = ((640, 270), (660, 360), (390, 350), (1366, 650))
 HOME = np.array([[1.0, -1.0, 0.8], [0.0, 0.0, 0.3]])
@@ -55,6 +46,15 @@ class Viewer:
 
 def follow(camera: Camera, points: np.ndarray, *, now: float = 0.0, changed: bool = False) -> None:
     camera.follow(Drawn(points, []), HOME, now, changed=changed)
+
+
+def test_axes_are_those_of_a_camera_that_stands_upright() -> None:
+    for look_at in ((0.0, 0.0, 0.3), (1.0, -1.0, 0.0)):  # the second straight down
+        right, up, forward = camera_axes((1.0, -1.0, 0.8), look_at)
+        np.testing.assert_allclose(np.cross(right, forward), up, atol=1e-12)
+        assert right[2] == 0.0
+        assert np.linalg.norm(right) == pytest.approx(1.0)
+        assert up[2] >= 0.0
 
 
 @pytest.mark.parametrize("size", SIZES)

@@ -47,7 +47,7 @@ def main() -> None:
             page.evaluate("document.querySelector('#robot').requestFullscreen()")
             page.wait_for_timeout(8000)
             image = _card(_shot(page))
-        image.save(target, quality=82, method=6)
+        image.save(target, quality=72, method=6)
         print(f"{target}: {target.stat().st_size / 1024:.0f} KB")
         browser.close()
 

@@ -8,7 +8,7 @@ import pinocchio as pin
 
 Vector3 = tuple[float, float, float]
 
-DARK: Vector3 = (0.3, 0.32, 0.36)
+DARK: Vector3 = (0.36, 0.39, 0.44)
 LIGHT: Vector3 = (0.62, 0.65, 0.7)
 BLUE: Vector3 = (0.16, 0.42, 0.76)
 ORANGE: Vector3 = (0.88, 0.5, 0.16)

@@ -40,7 +40,8 @@ class Scene(Protocol):
         self, name: str, points: np.ndarray, color: Color = "actual", strength: float = 1.0
     ) -> None:
         """A polyline through `points` (k, 3) [m]. Of a lower `strength`, in (0, 1], it is paler:
-        so that what was tried before fades behind what is tried now."""
+        so that what was tried before fades behind what is tried now. A muted one may leave the
+        view; all else that is drawn is kept in it."""
         ...
 
     def arrow(self, name: str, start: ArrayLike, end: ArrayLike, color: Color = "force") -> None:
@@ -188,6 +189,15 @@ class NullScene:
         self, name: str, starts: np.ndarray, ends: np.ndarray, color: Color = "force"
     ) -> None:
         self.names.append(name)
+
+
+def arc_point(center: ArrayLike, axis: ArrayLike, angle: ArrayLike, radius: float) -> np.ndarray:
+    """(..., 3) [m]: where `Scene.arc` is after angles (...) [rad] about its axis."""
+    z: np.ndarray = np.asarray(axis, float) / np.linalg.norm(axis)
+    x = np.cross(z, [0.0, 0.0, 1.0] if abs(z[2]) < 0.9 else [1.0, 0.0, 0.0])
+    x /= np.linalg.norm(x)
+    turned = np.multiply.outer(np.cos(angle), x) + np.multiply.outer(np.sin(angle), np.cross(z, x))
+    return np.asarray(np.asarray(center, float) + radius * turned)
 
 
 def cell_at(

@@ -31,7 +31,7 @@ class CellsNode(Node):
     def __init__(
         self,
         server: viser.ViserServer,
-        name: str,
+        path: str,
         origin: tuple[float, float, float],
         size: float,
         colors: np.ndarray,
@@ -44,7 +44,7 @@ class CellsNode(Node):
         half = 0.5 * size * (1.0 - GAP)
         square = half * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], np.float32)
         board: Any = server.scene.add_batched_meshes_simple(
-            f"/{name}",
+            path,
             square,
             np.array([[0, 1, 2], [0, 2, 3]], np.uint32),
             batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (rows * columns, 1)),
@@ -80,22 +80,22 @@ class SurfaceNode(Node):
     def __init__(
         self,
         server: viser.ViserServer,
-        name: str,
+        path: str,
         points: np.ndarray,
         colors: np.ndarray,
         view: View,
     ) -> None:
-        super().__init__(server.scene.add_frame(f"/{name}", show_axes=False))
+        super().__init__(server.scene.add_frame(path, show_axes=False))
         self._exposure = exposure(view)
         data = glb(points, colors, self._exposure)
         self._shown, self._hidden = (
-            server.scene.add_glb(f"/{name}/{copy}", data, visible=copy == 0, cast_shadow=False)
+            server.scene.add_glb(f"{path}/{copy}", data, visible=copy == 0, cast_shadow=False)
             for copy in range(2)
         )
         # A speck that stays: while something wears a shader, the viewer need not compile it again.
         speck = np.broadcast_to(points.reshape(-1, 3).mean(axis=0), (2, 2, 3))
         data = glb(speck, np.ones((2, 2, 3)), self._exposure)
-        server.scene.add_glb(f"/{name}/speck", data, cast_shadow=False)
+        server.scene.add_glb(f"{path}/speck", data, cast_shadow=False)
         self._last = np.stack([points, colors])
         self._when = time.monotonic()
         self._preparing = False
@@ -118,9 +118,7 @@ class SurfaceNode(Node):
 def exposure(view: View) -> float:
     """How much brighter the scene's light makes a colour (linear): a value's colour is made so
     much darker, to be about the one its legend shows."""
-    if view.graphics == "low":
-        return 1.5
-    return 2.7 if view.dark else 3.6
+    return 1.5 if view.graphics == "low" else 2.7
 
 
 def glb(points: np.ndarray, colors: np.ndarray, exposure: float) -> bytes:

@@ -88,6 +88,12 @@ class SetView(Message):
     view: View
 
 
+class ResetView(Message):
+    """The camera of everybody back to where it has all in view, and follows again."""
+
+    command: Literal["reset_view"]
+
+
 class SolverRun(Message):
     """Let the solver run."""
 
@@ -121,7 +127,7 @@ class SolverPace(Message):
     pace: Annotated[Finite, Field(ge=0.0, le=1000.0)]
 
 
-WorldCommand = Run | Pause | Step | Reset | Speed | Seed | Apply | Press | SetView
+WorldCommand = Run | Pause | Step | Reset | Speed | Seed | Apply | Press | SetView | ResetView
 SolverCommand = SolverRun | SolverPause | SolverStep | SolverShow | SolverPace
 Command = Annotated[WorldCommand | SolverCommand, Field(discriminator="command")]
 

@@ -190,6 +190,9 @@ class LiveSession:
         self.controls.view = View(**view)
         self.scene.set_view(self.controls.view)
 
+    def _do_reset_view(self) -> None:
+        self.scene.reset_view()
+
     def _do_viewers(self, count: int) -> None:
         if count > self.controls.viewers:
             self.broadcast.send_hello()

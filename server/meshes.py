@@ -1,12 +1,15 @@
 """Shapes as the scene wants them: glTF with materials, bare triangles, segments of lines. Meshes
 are cached, so that a worker forked from a process that has loaded them finds them in memory."""
 
+import itertools
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
 import numpy as np
 import trimesh
 
+from labs.scene import arc_point
 from labs.shapes import Box, Cylinder, Sphere, Visual
 
 Triangles = tuple[np.ndarray, np.ndarray]
@@ -23,6 +26,16 @@ def triangles(visual: Visual) -> Triangles:
     return _triangles(visual.mesh, visual.scale, visual.shape)
 
 
+def outline(pieces: Sequence[Visual]) -> dict[int, np.ndarray]:
+    """Points (k, 3) [m] that reach as far as the pieces do, by the joint they move with."""
+    found: dict[int, list[np.ndarray]] = {}
+    for piece in pieces:
+        local = _corners(piece.mesh, piece.scale, piece.shape)
+        place = piece.placement
+        found.setdefault(piece.joint, []).append(local @ place.rotation.T + place.translation)
+    return {joint: np.concatenate(points) for joint, points in found.items()}
+
+
 @cache
 def torus(radius: float, thickness: float) -> Triangles:
     """A ring about z."""
@@ -37,16 +50,22 @@ def ball() -> Triangles:
 
 def arc_with_head(center: np.ndarray, axis: np.ndarray, angle: float, radius: float) -> np.ndarray:
     """Segments (k, 2, 3) of an arc about `axis`, with an arrow's head where it ends."""
-    axis = axis / np.linalg.norm(axis)
-    x = np.cross(axis, [0.0, 0.0, 1.0] if abs(axis[2]) < 0.9 else [1.0, 0.0, 0.0])
-    x /= np.linalg.norm(x)
-    y = np.cross(axis, x)
     turns = np.linspace(0.0, angle, 25)
-    points = center + radius * (np.outer(np.cos(turns), x) + np.outer(np.sin(turns), y))
+    points = arc_point(center, axis, turns, radius)
     back = turns[-1] - np.sign(angle) * min(0.3, abs(angle) / 2)
-    barbs = [r * (np.cos(back) * x + np.sin(back) * y) for r in (0.85 * radius, 1.15 * radius)]
-    head = [[points[-1], center + barb] for barb in barbs]
+    head = [[points[-1], arc_point(center, axis, back, r * radius)] for r in (0.85, 1.15)]
     return np.concatenate([np.stack([points[:-1], points[1:]], 1), head]).astype(np.float32)
+
+
+@cache
+def _corners(
+    path: str, scale: tuple[float, float, float], shape: Box | Cylinder | Sphere | None
+) -> np.ndarray:
+    """(k, 3) [m]: the vertices that reach farthest along 26 directions."""
+    vertices = _triangles(path, scale, shape)[0].astype(float)
+    ways = np.array([way for way in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(way)])
+    farthest: np.ndarray = vertices[np.unique(np.argmax(vertices @ ways.T, axis=0))]
+    return farthest
 
 
 @cache

@@ -74,12 +74,12 @@ class ArmNode(Node):
     """An arm: a node a joint, nested as the joints are, with its pieces fixed to them."""
 
     def __init__(
-        self, server: viser.ViserServer, name: str, arm: Body, ghost: bool, view: View
+        self, server: viser.ViserServer, path: str, arm: Body, ghost: bool, view: View
     ) -> None:
         self._scene = server.scene
-        super().__init__(self._scene.add_frame(f"/{name}", show_axes=False))
+        super().__init__(self._scene.add_frame(path, show_axes=False))
         self._model, self._data = arm.model, arm.model.createData()
-        self._paths = [f"/{name}"]
+        self._paths = [path]
         self._joints: list[Any] = []
         for joint in range(1, self._model.njoints):
             path = f"{self._paths[self._model.parents[joint]]}/{self._model.names[joint]}"
@@ -89,6 +89,7 @@ class ArmNode(Node):
         pieces = arm.visuals if view.graphics == "high" and not ghost else arm.collisions
         for index, piece in enumerate(pieces):
             self._piece(f"{self._paths[piece.joint]}/piece{index}", piece, ghost, view)
+        self._outline = meshes.outline(arm.collisions)
         self._rings: list[Any] = []
         self._levels: list[int] = []
 
@@ -105,6 +106,13 @@ class ArmNode(Node):
         for joint in np.flatnonzero(~still[:, :3].all(axis=1)):
             self._joints[joint].position = poses[joint, :3]
             self._poses[joint, :3] = poses[joint, :3]
+
+    def outline(self) -> np.ndarray:
+        """(k, 3) [m]: points on what can be seen of it, where it was moved last."""
+        at = self._data.oMi
+        return np.concatenate(
+            [points @ at[j].rotation.T + at[j].translation for j, points in self._outline.items()]
+        )
 
     def rings(self, effort: np.ndarray) -> None:
         """A ring on every joint near its torque limit: amber from 0.8, red at the limit."""

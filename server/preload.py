@@ -43,6 +43,7 @@ for _name in ARMS:
             meshes.gltf(_piece)
     for _piece in (*_arm.collisions, *(p for p in _arm.visuals if not p.mesh)):
         meshes.triangles(_piece)
+    meshes.outline(_arm.collisions)
 meshes.torus(0.095, 0.009)
 meshes.ball()
 # What is loaded now is never collected: its pages stay shared among all workers.

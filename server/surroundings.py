@@ -18,9 +18,7 @@ def show_surroundings(server: viser.ViserServer, view: View) -> None:
     scene = server.scene
     high = view.graphics == "high"
     scene.configure_default_lights(enabled=True, cast_shadow=high)
-    scene.configure_environment_map(
-        "studio" if high else None, environment_intensity=0.25 if view.dark else 0.45
-    )
+    scene.configure_environment_map("studio" if high else None, environment_intensity=0.25)
     # Without an environment map nothing lights what faces away from the lamps.
     scene.add_light_ambient("/ambient", intensity=0.0 if high else 1.2)
     scene.add_grid(

@@ -5,8 +5,8 @@ quaternion a joint, and one that has not moved sends nothing. What a frame does 
 hidden."""
 
 import math
+from collections import Counter
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -14,10 +14,13 @@ import viser
 from numpy.typing import ArrayLike
 
 from labs.engine.run import World
-from labs.scene import Color
+from labs.scene import Color, cell_centers
 from labs.shapes import Body
 from server import meshes
 from server.boards import CellsNode, SurfaceNode
+from server.camera import CORNERS, Cameras
+from server.handles import HandleNode
+from server.labels import LabelNode, arrange_nodes
 from server.mailbox import Mailbox
 from server.messages import View
 from server.nodes import COLORS, ArmNode, Node, blend_with_background
@@ -25,6 +28,8 @@ from server.surroundings import show_surroundings
 
 TRAIL_EVERY = 3
 """Frames between two updates of a trail or of many arrows: they are long messages."""
+LABELS_EVERY = 12
+"""Frames between two looks at where labels stand."""
 
 
 class ViserScene:
@@ -33,9 +38,12 @@ class ViserScene:
     def __init__(self, server: viser.ViserServer, mailbox: Mailbox, view: View) -> None:
         self._server, self._mailbox = server, mailbox
         self._nodes: dict[str, Node] = {}
-        self._drawn: set[str] = set()
+        self._drawn: dict[str, None] = {}  # in the order drawn
         self._frame = 0
-        self._camera: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+        self._shown: list[object] = []
+        """The run that was drawn, and what its bodies and boards looked like."""
+        self._made: Counter[str] = Counter()
+        self._cameras = Cameras(server)
         server.gui.main_panel.dock_right()
         server.gui.main_panel.minimize()  # one tap away: the page has knobs of its own
         self.set_view(view)
@@ -56,18 +64,23 @@ class ViserScene:
             world.lab.draw(self, world.params, world.state)
             for name, node in self._nodes.items():
                 node.show(name in self._drawn)
+            drawn = [self._nodes[name] for name in self._drawn]
+            shown = [node.appearance for node in drawn if isinstance(node, ArmNode | CellsNode)]
+            held = any(node.held for node in drawn if isinstance(node, HandleNode))
+            self._cameras.follow(changed=[world.runs, *shown] != self._shown, held=held)
+            if self._frame % LABELS_EVERY == 0:
+                arrange_nodes(drawn, self._cameras)
+        self._shown = [world.runs, *shown]
         self._frame += 1
+
+    def reset_view(self) -> None:
+        """Looks as if nobody had moved a camera."""
+        self._cameras.release()
 
     # What a lab draws -----------------------------------------------------------------------
 
     def camera(self, position: ArrayLike, look_at: ArrayLike) -> None:
-        wanted = (_three(position), _three(look_at))
-        if wanted == self._camera:
-            return
-        self._camera = wanted
-        self._server.initial_camera.position, self._server.initial_camera.look_at = wanted
-        for client in self._server.get_clients().values():
-            client.camera.position, client.camera.look_at = wanted
+        self._cameras.look(position, look_at)
 
     def arm(
         self,
@@ -80,10 +93,13 @@ class ViserScene:
     ) -> None:
         appearance = (id(arm), ghost)
         node = self._node(
-            name, appearance, lambda: ArmNode(self._server, name, arm, ghost, self._view)
+            name, appearance, lambda path: ArmNode(self._server, path, arm, ghost, self._view)
         )
         assert isinstance(node, ArmNode)
         node.move(q)
+        outline = node.outline()
+        self._cameras.see(outline)
+        self._cameras.avoid(outline)
         if effort is not None:
             node.rings(effort)
 
@@ -94,53 +110,37 @@ class ViserScene:
             return
         segments = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
         mixed = blend_with_background(color, strength, self._view.dark)
-
-        def make() -> Node:
-            return Node(
-                self._server.scene.add_line_segments(
-                    f"/{name}", segments, mixed, thickness=2.5, thickness_units="screen"
-                )
-            )
-
-        node = self._node(name, "trail", make)
-        node.send("colors", mixed)
+        node = self._lines(name, segments, mixed, 2.5)
+        if color != "muted":
+            self._cameras.see(points)
         if self._frame % TRAIL_EVERY == 0:
             node.send("points", segments)
 
     def arrow(self, name: str, start: ArrayLike, end: ArrayLike, color: Color = "force") -> None:
         points = np.array([[_three(start), _three(end)]], np.float32)
 
-        def make() -> Node:
-            return Node(
-                self._server.scene.add_arrows(
-                    f"/{name}",
-                    points,
-                    COLORS[color],
-                    shaft_radius=0.012,
-                    head_radius=0.03,
-                    head_length=0.07,
-                )
-            )
-
-        self._node(name, color, make).send("points", points)
+        self._arrows(name, points, color, 0.07).send("points", points)
+        self._cameras.see(points)
 
     def sphere(self, name: str, center: ArrayLike, radius: float, color: Color = "actual") -> None:
-        def make() -> Node:
-            return Node(self._server.scene.add_icosphere(f"/{name}", radius, color=COLORS[color]))
+        def make(path: str) -> Node:
+            return Node(self._server.scene.add_icosphere(path, radius, color=COLORS[color]))
 
         self._node(name, (radius, color), make).place(np.asarray(center))
+        self._cameras.see_ball(center, radius)
 
     def frame(self, name: str, placement: pin.SE3, length: float = 0.15) -> None:
-        def make() -> Node:
+        def make(path: str) -> Node:
             return Node(
                 self._server.scene.add_frame(
-                    f"/{name}", axes_length=length, axes_radius=0.04 * length, origin_radius=0.0
+                    path, axes_length=length, axes_radius=0.04 * length, origin_radius=0.0
                 )
             )
 
         node = self._node(name, length, make)
         node.place(placement.translation)
         node.turn(pin.SE3ToXYZQUAT(placement)[[6, 3, 4, 5]])
+        self._cameras.see(placement.translation + length * placement.rotation.T)
 
     def arc(
         self,
@@ -153,24 +153,19 @@ class ViserScene:
     ) -> None:
         segments = meshes.arc_with_head(np.asarray(center), np.asarray(axis), angle, radius)
 
-        def make() -> Node:
-            return Node(
-                self._server.scene.add_line_segments(
-                    f"/{name}", segments, COLORS[color], thickness=4.0, thickness_units="screen"
-                )
-            )
-
-        self._node(name, color, make).send("points", segments)
+        node = self._lines(name, segments, np.array(COLORS[color], np.uint8), 4.0)
+        node.send("points", segments)
+        self._cameras.see(segments)
 
     def ellipsoid(
         self, name: str, center: ArrayLike, axes: np.ndarray, color: Color = "actual"
     ) -> None:
         vertices, faces = meshes.ball()
 
-        def make() -> Node:
+        def make(path: str) -> Node:
             return Node(
                 self._server.scene.add_mesh_simple(
-                    f"/{name}",
+                    path,
                     vertices @ axes.T,
                     faces,
                     color=COLORS[color],
@@ -183,31 +178,25 @@ class ViserScene:
         node = self._node(name, color, make)
         node.send("vertices", (vertices @ axes.T).astype(np.float32))
         node.place(np.asarray(center))
+        self._cameras.see(np.asarray(center) + np.concatenate([axes.T, -axes.T]))
 
     def handle(self, name: str, position: ArrayLike, radius: float = 0.05) -> None:
-        def make() -> Node:
-            ball = self._server.scene.add_icosphere(
-                f"/{name}", radius, color=COLORS["force"], opacity=0.35, cast_shadow=False
-            )
+        def make(path: str) -> Node:
+            return HandleNode(self._server, path, name, radius, self._mailbox)
 
-            # Asynchronous: these run in order on Viser's event loop.
-            async def dragged(event: Any) -> None:
-                held = event.phase != "end"
-                point = tuple(map(float, event.end_position)) if held else None
-                self._mailbox.put("hold", handle=name, point=point)
-
-            ball.on_drag("left")(dragged)
-            return Node(ball)
-
-        self._node(name, radius, make).place(np.asarray(position))
+        node = self._node(name, radius, make)
+        assert isinstance(node, HandleNode)
+        point = np.asarray(position, float)
+        node.place(point)
+        shown = node.keep_reachable(self._cameras.metres_per_pixel(point))
+        self._cameras.see_ball(point, radius)
+        self._cameras.avoid(point + shown * CORNERS)
 
     def label(self, name: str, text: str, position: ArrayLike) -> None:
-        def make() -> Node:
-            return Node(self._server.scene.add_label(f"/{name}", text))
-
-        node = self._node(name, "label", make)
-        node.send("text", text)
-        node.place(np.asarray(position))
+        node = self._node(name, "label", lambda path: LabelNode(self._server, path, text))
+        assert isinstance(node, LabelNode)
+        node.write(text, np.asarray(position, float))
+        self._cameras.see_label(node.point, text)
 
     def cells(
         self,
@@ -224,21 +213,23 @@ class ViserScene:
             self._mailbox.put("hold", handle=name, point=point)
             self._mailbox.put("hold", handle=name, point=None)
 
-        def make() -> Node:
+        def make(path: str) -> Node:
             on_click = clicked if clickable else None
-            return CellsNode(self._server, name, corner, size, colors, on_click, self._view)
+            return CellsNode(self._server, path, corner, size, colors, on_click, self._view)
 
         node = self._node(name, (corner, size, colors.shape, clickable), make)
         assert isinstance(node, CellsNode)
         node.paint(colors)
+        self._cameras.see(cell_centers(corner, size, *colors.shape[:2]))
 
     def surface(self, name: str, points: np.ndarray, colors: np.ndarray) -> None:
-        def make() -> Node:
-            return SurfaceNode(self._server, name, points, colors, self._view)
+        def make(path: str) -> Node:
+            return SurfaceNode(self._server, path, points, colors, self._view)
 
         node = self._node(name, "surface", make)
         assert isinstance(node, SurfaceNode)
         node.draw(points, colors)
+        self._cameras.see(points)
 
     def arrows(
         self, name: str, starts: np.ndarray, ends: np.ndarray, color: Color = "force"
@@ -250,34 +241,52 @@ class ViserScene:
         # A head by steps of its size: the longest arrow may change a little each frame.
         head = 0.35 * 1.25 ** round(math.log(float(lengths.max()), 1.25))
 
-        def make() -> Node:
-            return Node(
-                self._server.scene.add_arrows(
-                    f"/{name}",
-                    points,
-                    COLORS[color],
-                    shaft_radius=0.15 * head,
-                    head_radius=0.4 * head,
-                    head_length=head,
-                )
-            )
-
-        node = self._node(name, (color, head), make)
+        node = self._arrows(name, points, color, head)
+        self._cameras.see(points)
         if self._frame % TRAIL_EVERY == 0:
             node.send("points", points)
 
     # Nodes ----------------------------------------------------------------------------------
 
-    def _node(self, name: str, appearance: object, make: Callable[[], Node]) -> Node:
-        """The node of this name, made anew where it must look different."""
+    def _node(self, name: str, appearance: object, make: Callable[[str], Node]) -> Node:
+        """The node of this name, made anew where it must look different; under a path of its own
+        then: a viewer may go on with the pose of a removed node of the same path."""
         node = self._nodes.get(name)
         if node is None or node.appearance != appearance:
             if node is not None:
                 node.remove()
-            node = self._nodes[name] = make()
+            number, self._made[name] = self._made[name], self._made[name] + 1
+            node = self._nodes[name] = make(f"/{name} {number}" if number else f"/{name}")
             node.appearance = appearance
-        self._drawn.add(name)
+        self._drawn[name] = None
         return node
+
+    def _lines(self, name: str, segments: np.ndarray, color: np.ndarray, thickness: float) -> Node:
+        def make(path: str) -> Node:
+            return Node(
+                self._server.scene.add_line_segments(
+                    path, segments, color, thickness=thickness, thickness_units="screen"
+                )
+            )
+
+        node = self._node(name, thickness, make)
+        node.send("colors", color)
+        return node
+
+    def _arrows(self, name: str, points: np.ndarray, color: Color, head: float) -> Node:
+        def make(path: str) -> Node:
+            return Node(
+                self._server.scene.add_arrows(
+                    path,
+                    points,
+                    COLORS[color],
+                    shaft_radius=0.18 * head,
+                    head_radius=0.45 * head,
+                    head_length=head,
+                )
+            )
+
+        return self._node(name, (color, head), make)
 
     def _clear(self) -> None:
         for node in self._nodes.values():

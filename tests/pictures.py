@@ -8,7 +8,7 @@ from pathlib import Path
 from urllib.parse import urlencode
 
 from PIL import Image
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page, ViewportSize, sync_playwright
 
 from labs.engine.catalog import find
 from tests import chromium
@@ -16,6 +16,9 @@ from tests.served import Served
 
 CARD, PANEL = (640, 400), 40
 """[px] size of a card's picture; width of the strip beside the scene."""
+WINDOW: ViewportSize = {"width": 1440, "height": 900}
+CARD_WINDOW: ViewportSize = {"width": 840, "height": 500}
+"""[px] Of the page; for a card small, so that lines and labels are large in it."""
 
 
 def main() -> None:
@@ -30,7 +33,7 @@ def main() -> None:
         browser = playwright.chromium.launch(
             executable_path=chromium.find(), args=chromium.ARGUMENTS
         )
-        page = browser.new_page(viewport={"width": 1440, "height": 900})
+        page = browser.new_page(viewport=WINDOW if options.page else CARD_WINDOW)
         page.add_init_script("localStorage.setItem('graphics', 'high')")
         page.goto(f"{server.address}/labs/{options.lab}?{urlencode(query)}")
         page.wait_for_selector("#curtain.open", state="attached", timeout=60_000)
@@ -44,7 +47,7 @@ def main() -> None:
             page.evaluate("document.querySelector('#robot').requestFullscreen()")
             page.wait_for_timeout(8000)
             image = _card(_shot(page))
-        image.save(target, quality=82, method=6)
+        image.save(target, quality=72, method=6)
         print(f"{target}: {target.stat().st_size / 1024:.0f} KB")
         browser.close()
 
@@ -67,9 +70,9 @@ def _shot(page: Page) -> Image.Image:
 
 
 def _card(shot: Image.Image) -> Image.Image:
-    """The middle of the scene without its panel, in a card's proportions."""
+    """The scene without its panel, in a card's proportions."""
     width, height = shot.width - PANEL, shot.height
-    scale = min(width / CARD[0], height / CARD[1]) * 0.8
+    scale = min(width / CARD[0], height / CARD[1])
     w, h = CARD[0] * scale, CARD[1] * scale
     left, top = (width - w) / 2, (height - h) / 2
     box = (left, top, left + w, top + h)

@@ -24,12 +24,12 @@ def decode(window: bytes) -> list[dict[str, Any]]:
     return messages
 
 
-def camera() -> bytes:
-    """What makes a client count as connected."""
+def camera(position: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> bytes:
+    """Where a client looks from; the first makes it count as connected."""
     return message(
         "ViewerCameraMessage",
         wxyz=(1, 0, 0, 0),
-        position=(1, 1, 1),
+        position=position,
         fov=1.0,
         near=0.01,
         far=100.0,

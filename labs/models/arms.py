@@ -6,7 +6,7 @@ joint, gear^2 J_rotor; in geared arms it dominates, so `model.armature` carries 
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from labs.shapes import (
     DARK,
     LIGHT,
     ORANGE,
+    STEEL,
     Box,
     Cylinder,
     Shape,
@@ -77,7 +78,7 @@ def ur5() -> Arm:
         torque_limit=model.effortLimit.copy(),
         tip=model.getFrameId("tool0"),
         visuals=_visuals(visual),
-        collisions=_visuals(collision),
+        collisions=_in_steel(_visuals(collision)),
         camera=((1.05, -0.85, 0.75), (0.22, 0.05, 0.36)),
     )
 
@@ -100,7 +101,7 @@ def panda() -> Arm:
         torque_limit=model.effortLimit.copy(),
         tip=model.getFrameId("panda_hand_tcp"),
         visuals=_visuals(visual),
-        collisions=_visuals(collision),
+        collisions=_in_steel(_visuals(collision)),
         camera=((1.1, -0.95, 0.85), (0.14, 0.03, 0.42)),
     )
 
@@ -238,6 +239,11 @@ def _visuals(geometry: pin.GeometryModel) -> tuple[Visual, ...]:
         )
         for piece in geometry.geometryObjects
     )
+
+
+def _in_steel(pieces: tuple[Visual, ...]) -> tuple[Visual, ...]:
+    """Light-weight shapes bring no material."""
+    return tuple(replace(piece, color=STEEL[piece.joint % 2]) for piece in pieces)
 
 
 def _shape(geometry: Any) -> Shape | None:

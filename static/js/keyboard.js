@@ -14,6 +14,7 @@ const KEYS = {
   c: "clear",
   l: "share",
   f: "full",
+  v: "view",
   "?": "help",
 };
 

@@ -1,5 +1,6 @@
 // The lab page: joins the session with everything that shows it or changes it.
 
+import { describeScene } from "./describe.js";
 import { Experiments } from "./experiments.js";
 import { wireKeyboard } from "./keyboard.js";
 import { KnobColumn } from "./knob_column.js";
@@ -60,6 +61,7 @@ const actions = {
   share: () => copy(new URL(link, location.href).href, "Link copied: it opens this lab with these parameters."),
   command: copyCommand,
   full: () => stage.fullScreen(),
+  view: () => send({ command: "reset_view" }),
   help: () => document.getElementById("help").showModal(),
   experiment: (i) => experiments.start(i),
 };
@@ -193,6 +195,7 @@ document.getElementById("help").addEventListener("click", (event) => {
 
 new Sheets();
 wireSplitters();
+describeScene(document.getElementById("scene-words"));
 wirePreferences();
 wireMenus();
 wireKeyboard(actions);

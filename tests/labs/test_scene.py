@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from labs.scene import NullScene, cell_at, cell_centers
+from labs.scene import NullScene, arc_point, cell_at, cell_centers
 
 ORIGIN, SIZE, ROWS, COLUMNS = (1.0, -2.0, 0.3), 0.25, 3, 5
 
@@ -45,3 +45,13 @@ def test_a_scene_nobody_sees_keeps_the_names() -> None:
     scene.surface("value", np.zeros((2, 3, 3)), np.zeros((2, 3, 3)))
     scene.arrows("policy", np.zeros((0, 3)), np.zeros((0, 3)))
     assert scene.names == ["board", "value", "policy"]
+
+
+def test_an_arc_turns_about_its_axis_in_the_right_handed_sense() -> None:
+    center, axis = np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, 2.0])
+    first, quarter = (arc_point(center, axis, angle, 0.5) - center for angle in (0.0, np.pi / 2))
+    np.testing.assert_allclose(np.cross(first, quarter), [0.0, 0.0, 0.25], atol=1e-15)
+    angles = np.linspace(-6.0, 6.0, 7)
+    many = arc_point(center, [0.3, -0.2, 0.5], angles, 0.5)
+    np.testing.assert_allclose(np.linalg.norm(many - center, axis=1), 0.5)
+    np.testing.assert_allclose((many - center) @ [0.3, -0.2, 0.5], 0.0, atol=1e-15)

@@ -10,12 +10,13 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from labs.engine.catalog import find
+from labs.models.arms import load
 from server.mailbox import Mailbox
 from server.messages import View
 from server.nodes import COLORS, DARK, LIGHT, blend_with_background
 from server.viser_scene import ViserScene
 from tests.served import Served
-from tests.viser_client import PROTOCOL, SceneClient, message
+from tests.viser_client import PROTOCOL, SceneClient, camera, message
 
 
 def test_the_viewers_script_comes_after_the_element_it_draws_in(served: Served) -> None:
@@ -29,6 +30,18 @@ def test_the_viewers_script_comes_after_the_element_it_draws_in(served: Served) 
     (root,) = (found.start() for found in re.finditer('<div id="root"></div>', whole))
     assert whole.index("/static/css/scene.css") < ours < whole.index("</head>") < root < script
     assert whole[whole.rindex("</script>") :].split() == ["</script></body>", "</html>"]
+
+
+def test_a_view_is_reset_after_a_hand_has_moved_it(served: Served) -> None:
+    with served.session("oscillator") as session, SceneClient(session) as scene:
+        session.command("pause")
+        scene.socket.send(camera((9.0, 9.0, 9.0)))
+        scene.skip(0.2)
+        session.command("reset_view")
+        placed = scene.read_until(
+            lambda m: m["type"] == "SetCameraPositionMessage" and not m["initial"]
+        )
+        assert np.linalg.norm(placed["position"]) < 6.0
 
 
 def test_the_robot_is_a_tree_of_its_joints(served: Served) -> None:
@@ -157,6 +170,32 @@ def test_a_trail_fades_without_being_made_anew() -> None:
             shown = node._handle.colors
             assert shown.tolist() == blend_with_background("actual", strength, dark=True).tolist()
         assert scene._nodes["echo"] is node
+    finally:
+        server.stop()
+
+
+def test_a_robot_in_anothers_place_has_nodes_of_its_own() -> None:
+    """A viewer keeps the pose of a node that is removed and made again at once, and is not told a
+    pose that is a node's default: the base of a UR5 hung where that of a pendulum had been."""
+    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
+
+    def nodes() -> set[str]:
+        there = server.scene._handle_from_node_name
+        return {name for name in there if name.startswith("/robot")}
+
+    try:
+        scene = ViserScene(server, Mailbox(), View(graphics="low"))
+        past: set[str] = set()
+        for arm in (load("double-pendulum"), load("ur5"), load("double-pendulum")):
+            for ghost in (False, True):
+                scene.arm("robot", arm, arm.home, ghost=ghost)
+                assert nodes()
+                assert not nodes() & past
+                past |= nodes()
+        scene.set_view(View(dark=True, graphics="low"))
+        scene.arm("robot", arm, arm.home)
+        assert nodes()
+        assert not nodes() & past
     finally:
         server.stop()
 

@@ -8,6 +8,9 @@ from labs.scene import Scene
 ARROW_SCALE, LONGEST_ARROW = 0.04, 0.6
 """[m/N] length of a force's arrow, up to so many [m]."""
 
+FRONT = np.array([0.1, 0.0, 0.0])
+"""[m] from the middle of the mass to its front: a handle within could not be seen."""
+
 
 def draw_regulated(
     scene: Scene, params: LqrParams, x: np.ndarray, u: np.ndarray, force: np.ndarray
@@ -21,7 +24,7 @@ def draw_regulated(
     effort = np.abs(u) / params.control_limit if params.system == "ur5" else None
     scene.arm("system", arm, q, effort=effort)
     tip = mechanism.tip(q)
-    scene.handle("pull", tip, 0.05)
+    scene.handle("pull", tip + FRONT if params.system == "mass" else tip, 0.05)
     if force.any():
         scene.arrow("force", tip, tip + _arrow(force))
     if params.system in ("cart-pole", "mass"):

@@ -22,7 +22,7 @@ RING_RADII = (0.2, 0.17)
 
 
 def draw_arm(scene: Scene, params: KinematicsParams, shown: int) -> None:
-    """The arm and its frames, that of the factor shown, from 1, longer and with its name."""
+    """The arm and its frames, that of the factor shown, from 1, longer."""
     arm, q = load(params.robot), params.q
     scene.camera(*CAMERA[params.robot])
     scene.arm("robot", arm, q, ghost=params.translucent)
@@ -31,8 +31,8 @@ def draw_arm(scene: Scene, params: KinematicsParams, shown: int) -> None:
     for i, factor in enumerate(params.chain.factors(q), start=1):
         placement = placement @ factor
         scene.frame(f"frame {i}", pin.SE3(placement), SHOWN_AXES if i == shown else AXES)
-        if i == shown:
-            scene.label("shown", f"frame {i}", placement[:3, 3] + [0.0, 0.0, 0.06])
+        name, text = ("shown", f"frame {i}") if i == shown else (f"name of {i}", f"{i}")
+        scene.label(name, text, placement[:3, 3])
 
 
 def draw_gimbal(scene: Scene, gimbal: Gimbal, rotation: np.ndarray) -> None:

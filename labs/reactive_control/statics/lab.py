@@ -172,7 +172,7 @@ class Statics(Lab[StaticsParams, StaticsState]):
         if np.linalg.norm(velocity) > 0.01:
             scene.arrow("velocity", tip, tip + velocity, "actual")
         directions = np.linalg.svd(load.jacobian[:3], full_matrices=False)[0]
-        cheapest = 0.45 * directions[:, -1]
+        cheapest = 0.3 * directions[:, -1]
         scene.trail("cheapest direction", np.array([tip - cheapest, tip + cheapest]), "muted")
         scene.handle("pull", end, 0.04)
 

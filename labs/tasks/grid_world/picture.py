@@ -4,7 +4,6 @@ and the wind, a policy as arrows, the ways it leads and who walks them; and a re
 Dark is cheap and pale is dear, as in a heat map of the page; what has no value is grey.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -22,6 +21,8 @@ WALKERS: tuple[Color, ...] = ("actual", "reference")
 """Of the first and the second of those side by side."""
 HEIGHT = 0.55
 """[m] of the relief at the largest value."""
+CAMERA = ((0.0, -1.0, 1.25), (0.0, 0.0, 0.0))
+"""From where one looks: steep enough to read the arrows, flat enough to see the relief."""
 LIFT = np.array([0.0, 0.0, 0.012])
 """[m] Lines and arrows float this far above what they belong to."""
 
@@ -50,8 +51,8 @@ class Board:
 
     @cached_property
     def relief(self) -> np.ndarray:
-        """(rows, columns, 3) [m]: the places of the cells on the floor of the relief, behind."""
-        places: np.ndarray = self.centers + np.array([0.0, self.size * self.rows + 0.2, 0.0])
+        """(rows, columns, 3) [m]: the places of the cells on the floor of the relief, beside."""
+        places: np.ndarray = self.centers + np.array([self.size * self.columns + 0.25, 0.0, 0.0])
         return places
 
     def cell_at(self, point: tuple[float, float, float]) -> tuple[int, int] | None:
@@ -81,7 +82,7 @@ def draw_board(
     place = board(world)
     heights = _heights(world, V, high)
     relief = relief and min(world.shape) >= 2
-    _look_at(scene, place.origin, place.relief[0, -1] if relief else place.centers[0, -1])
+    scene.camera(*CAMERA)
     scene.cells(BOARD, place.origin, place.size, _colors(world, V, heights, goals=True))
     for x in range(len(world.cells)):
         if world.kind(x) in "SG":
@@ -97,7 +98,7 @@ def draw_board(
         points = place.relief + heights[..., None] * np.array([0.0, 0.0, 1.0])
         scene.surface("relief", points, _colors(world, V, heights, goals=False))
         _draw_policy(scene, "policy on the relief", world, policy, shown, points, place.size)
-        scene.label("values", "cost-to-go V", points[0, world.shape[1] // 2] + [0.0, 0.15, 0.3])
+        scene.label("values", "cost-to-go V", points[0, world.shape[1] // 2] + [0.0, 0.0, 0.12])
 
 
 def draw_way(
@@ -121,14 +122,6 @@ def draw_walkers(scene: Scene, world: GridWorld, walk: GridWalk) -> None:
     for m, center in enumerate((1.0 - part) * begin + part * end):
         beside = place.size * np.array([0.15 * m, 0.15 * m, 0.3])
         scene.sphere(f"walker {m + 1}", center + beside, 0.24 * place.size, WALKERS[m])
-
-
-def _look_at(scene: Scene, near: Sequence[float], far: np.ndarray) -> None:
-    """So that what reaches from the corner `near` to `far`, as wide as it is, is in view."""
-    depth = float(far[1]) - near[1]
-    distance = max(-1.8 * near[0], 1.2 * depth)
-    middle = near[1] + 0.5 * depth
-    scene.camera((0.0, middle - 0.5 * distance, 0.6 * distance), (0.0, middle, 0.0))
 
 
 def _heights(world: GridWorld, V: np.ndarray, high: float) -> np.ndarray:

@@ -86,7 +86,6 @@ class Board(Lab[BoardParams, BoardState]):
         phase = params.rate * state.t
         heights = np.sin(4.0 * x + phase) * np.cos(4.0 * y)
         slopes = np.stack([np.cos(4.0 * x + phase), -np.sin(4.0 * y), 0.0 * x], axis=-1)
-        # In the middle of the picture: row 2, column 4.
         scene.camera((0.05, -1.0, 1.0), (0.05, 0.05, 0.02))
         colors = sequential(heights, -1.0, 1.0)
         scene.surface("wave", centers + 0.1 * np.stack([0 * x, 0 * x, 4 + heights], -1), colors)

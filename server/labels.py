@@ -1,0 +1,102 @@
+"""Where labels stand around what they name: beside the robot and beside each other."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import viser
+
+from server.camera import Cameras
+from server.nodes import Node
+
+ANCHORS: dict[str, tuple[float, float]] = {
+    "bottom-center": (0.0, 1.0),
+    "center-left": (1.0, 0.0),
+    "center-right": (-1.0, 0.0),
+    "top-center": (0.0, -1.0),
+    "bottom-left": (1.0, 1.0),
+    "bottom-right": (-1.0, 1.0),
+    "top-left": (1.0, -1.0),
+    "top-right": (-1.0, -1.0),
+}
+"""Which part of a text stands on its point, the best first, and where that puts its middle: in half
+widths and heights, to the right and up."""
+ABOVE = next(iter(ANCHORS))
+CHARACTER, LINE = 7.0, 18.0
+"""[px] the width of a character, and the height of a line."""
+MOVED, WORSE = 3.0, 0.5
+"""What it costs a label to change its place, and to take the next best one."""
+COVERED = 40.0
+"""What it costs to stand wholly on another label; a point of a robot costs 1."""
+
+
+@dataclass(frozen=True)
+class Label:
+    """A text at a point of the screen (2,) [px, to the right and up], and how it stands now."""
+
+    text: str
+    point: np.ndarray
+    anchor: str = ABOVE
+
+
+class LabelNode(Node):
+    """A text at a point."""
+
+    def __init__(self, server: viser.ViserServer, path: str, text: str) -> None:
+        super().__init__(server.scene.add_label(path, text, anchor="bottom-center"))
+        self.text, self.point, self.anchor = text, np.zeros(3), ABOVE
+
+    def write(self, text: str, point: np.ndarray) -> None:
+        """What it says, and of which point (3,) [m]."""
+        self.text, self.point = text, point
+        self.send("text", text)
+        self.place(point)
+
+
+def arrange_nodes(nodes: Iterable[Node], cameras: Cameras) -> None:
+    """Places labels for whoever looks."""
+    labels = [node for node in nodes if isinstance(node, LabelNode)]
+    points = cameras.project(np.array([label.point for label in labels])) if labels else None
+    obstacles = cameras.project(cameras.solid)
+    if points is None or obstacles is None:
+        return
+    now = [Label(node.text, p, node.anchor) for node, p in zip(labels, points, strict=True)]
+    for node, anchor in zip(labels, arrange(now, obstacles), strict=True):
+        node.anchor = anchor
+        node.send("anchor", anchor)
+
+
+def arrange(labels: list[Label], obstacles: np.ndarray) -> list[str]:
+    """Anchors that keep the labels, the first ones first, off each other and off the obstacles
+    (k, 2) [px]."""
+    taken: list[np.ndarray] = []
+    chosen = []
+    for label in labels:
+        size = np.array([CHARACTER * len(label.text) + 8.0, LINE])
+
+        def box(anchor: str, at: np.ndarray = label.point, size: np.ndarray = size) -> np.ndarray:
+            middle = at + 0.5 * size * ANCHORS[anchor]
+            return np.array([middle - 0.5 * size, middle + 0.5 * size])
+
+        costs = {
+            anchor: WORSE * rank
+            + MOVED * (anchor != label.anchor)
+            + _inside(box(anchor), obstacles)
+            + COVERED * sum(_overlap(box(anchor), other) for other in taken)
+            for rank, anchor in enumerate(ANCHORS)
+        }
+        best = min(costs, key=costs.__getitem__)
+        taken.append(box(best))
+        chosen.append(best)
+    return chosen
+
+
+def _inside(box: np.ndarray, points: np.ndarray) -> int:
+    """How many points (k, 2) lie in a box, (2, 2): its lower left and its upper right corner."""
+    return int(((points > box[0]) & (points < box[1])).all(axis=1).sum())
+
+
+def _overlap(one: np.ndarray, other: np.ndarray) -> float:
+    """The part of a box that another covers."""
+    shared = np.minimum(one[1], other[1]) - np.maximum(one[0], other[0])
+    return float(np.prod(np.maximum(shared, 0.0)) / np.prod(one[1] - one[0]))

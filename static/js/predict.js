@@ -3,7 +3,7 @@
 
 import { number } from "./format.js";
 import { distance, Sketch } from "./sketch.js";
-import { recall, store } from "./storage.js";
+import { storedData, storeData } from "./store.js";
 
 const READ_TWICE = 2; // what a solver has found may reach the page a moment after its status
 
@@ -16,7 +16,7 @@ export class Prediction {
     this.commit = commit; // starts the experiment
     this.form = card.querySelector(".predict");
     this.verdict = card.querySelector(".verdict");
-    const { guess, outcome } = recall(this.key)?.[experiment.title] ?? {};
+    const { guess, outcome } = storedData(this.key, {})[experiment.title] ?? {};
     this.guess = this.isGuess(guess) ? guess : null;
     this.outcome = this.guess === null ? null : (outcome ?? null);
     this.wire();
@@ -127,8 +127,8 @@ export class Prediction {
   }
 
   save() {
-    const all = recall(this.key) ?? {};
-    store(this.key, JSON.stringify({ ...all, [this.experiment.title]: { guess: this.guess, outcome: this.outcome } }));
+    const { key, experiment, guess, outcome } = this;
+    storeData(key, { ...storedData(key, {}), [experiment.title]: { guess, outcome } });
   }
 
   isGuess(guess) {

@@ -2,8 +2,6 @@
 
 import { store, stored } from "./store.js";
 
-import { store, stored } from "./storage.js";
-
 const systemDark = matchMedia("(prefers-color-scheme: dark)");
 const listeners = new Set();
 

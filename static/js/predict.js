@@ -3,7 +3,7 @@
 
 import { number } from "./format.js";
 import { distance, Sketch } from "./sketch.js";
-import { storeData, storedData } from "./store.js";
+import { storedData, storeData } from "./store.js";
 
 const READ_TWICE = 2; // what a solver has found may reach the page a moment after its status
 
@@ -127,8 +127,8 @@ export class Prediction {
   }
 
   save() {
-    const all = storedData(this.key, {});
-    storeData(this.key, { ...all, [this.experiment.title]: { guess: this.guess, outcome: this.outcome } });
+    const { key, experiment, guess, outcome } = this;
+    storeData(key, { ...storedData(key, {}), [experiment.title]: { guess, outcome } });
   }
 
   isGuess(guess) {

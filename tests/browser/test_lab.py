@@ -39,6 +39,8 @@ def test_time_and_plots_run_and_pause(page: Page) -> None:
     before, t = lab.pixels(plot), lab.time()
     expect(page.locator("#clock span")).not_to_have_text(f"{t:.2f}")
     lab.pixels_when(plot, lambda now: bool((now != before).any()))  # the curves grow
+    described = expect(page.frame_locator("#robot").owner)
+    described.to_have_accessible_description(re.compile(r"t = [\d.]+ s; RMS error: [\d.]+ rad"))
     page.keyboard.press("Space")
     expect(page.locator("#run")).to_have_text(re.compile("Run"))
     lab.told()

@@ -99,7 +99,7 @@ def test_other_fenced_blocks_stay_code(entry: Entry) -> None:
 
 def test_a_symbol_with_a_slider_names_it(entry: Entry) -> None:
     html = write(entry, "The gain $k_p$.\n\n$$\\tau = k_p\\,e$$\n").html
-    assert '<a class="symbol" href="#param-kp" data-param="kp"><math>' in html
+    assert '<a class="symbol" href="#param-kp" data-param="kp" aria-label="k_p"><math>' in html
     assert '<mrow class="symbol" data-param="kp"><msub><mi>k</mi><mi>p</mi></msub></mrow>' in html
 
 

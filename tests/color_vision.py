@@ -46,7 +46,7 @@ def seen(srgb: np.ndarray, vision: str) -> np.ndarray:
     """sRGB colours (..., 3) as they look to this vision."""
     light = np.clip(linear(srgb) @ VISIONS[vision].T, 0.0, 1.0)
     curved = 1.055 * np.maximum(light, 1e-9) ** (1 / 2.4) - 0.055
-    return np.where(light <= 0.0031308, 12.92 * light, curved)
+    return np.asarray(np.where(light <= 0.0031308, 12.92 * light, curved))
 
 
 def distances(colors: Mapping[str, Sequence[float]]) -> Iterator[tuple[float, str]]:

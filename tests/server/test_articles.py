@@ -110,7 +110,8 @@ def test_other_fenced_blocks_stay_code(entry: Entry) -> None:
 
 def test_a_symbol_with_a_slider_names_it(entry: Entry) -> None:
     html = write(entry, "The gain $k_p$.\n\n$$\\tau = k_p\\,e$$\n").html
-    assert '<span class="symbol" role="button" tabindex="0" data-param="kp"><math>' in html
+    symbol = '<span class="symbol" role="button" tabindex="0" data-param="kp" aria-label="k_p">'
+    assert symbol + "<math>" in html
     assert '<mrow class="symbol" data-param="kp"><msub><mi>k</mi><mi>p</mi></msub></mrow>' in html
 
 

@@ -60,7 +60,7 @@ def learner_maps(
         "visits": np.log10(1.0 + visits.sum(axis=1)),
         "error": np.abs(value - best),
     }
-    known = visits.any(axis=1)
+    known = visits.sum(axis=1) > 0
     if isinstance(task.place, GridWorld):
         rows, columns = task.shape
         axes = {"x": np.arange(1.0, columns + 1), "y": np.arange(1.0, rows + 1)}

@@ -144,9 +144,9 @@ def test_cells_without_a_state_have_no_value_and_all_others_do() -> None:
     wall = [[False, False, False], [False, False, True]]
     np.testing.assert_array_equal(np.isnan(fields["V"]), wall)
     ways = {(x, y): (right, up) for x, y, right, up in fields["policy"].tolist()}
-    assert ways.keys() == {(1, 2), (1, 1), (2, 1)}, "every cell but the goal, the top row is y = 2"
+    assert ways.keys() == {(1, 2), (2, 2), (1, 1), (2, 1)}, "all but wall and goal; y = 2 on top"
     assert ways[1, 1] == ways[2, 1] == (1, 0)
-    assert ways[1, 2] == (0, -1)
+    assert ways[2, 2] == (0, -1)
     measured = world.lab.measure(world.params, world.state)
     assert measured["at_start"] == pytest.approx(1 + 0.95 + 0.95**2)
     assert measured["error"] < 1e-6

@@ -36,15 +36,17 @@ def test_nothing_overflows(page: Page, path: str) -> None:
 @pytest.mark.parametrize(("width", "height"), [(1366, 650), (1440, 790)])
 def test_knobs_robot_and_plots_are_in_view_together(page: Page, width: int, height: int) -> None:
     page.set_viewport_size({"width": width, "height": height})
-    for slug in ("joint-control", "lqr"):
-        lab = LabPage(page, scene=False).open(slug)
+    for slug, query, knobs in (
+        ("joint-control", "?controller=pid", ("kp", "ki", "kd")),
+        ("lqr", "", ("q_slide", "q_turn", "r")),
+    ):
+        lab = LabPage(page, scene=False).open(slug, query)
         for part in ("#view", "#transport", "#tiles", "#plots > :not([hidden])", "#shelf"):
             assert lab.whole(part), (slug, part)
         scene = page.locator("#view").bounding_box()
         assert scene
         assert scene["width"] >= 0.45 * width
-        gains = ("kp", "ki", "kd") if slug == "joint-control" else ("q_slide", "q_turn", "r")
-        assert all(lab.whole(f"#param-{name}") for name in gains)
+        assert all(lab.whole(f"#param-{name}") for name in knobs)
         screenshot(page, f"{slug}-{width}")
 
 

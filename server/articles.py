@@ -29,7 +29,7 @@ from mdit_py_plugins.dollarmath import dollarmath_plugin
 from labs.engine.catalog import Entry
 from labs.errors import LabError
 from labs.params import Params, Value
-from server.formulas import statements
+from server.line_breaks import statements
 
 _math = math_core.LatexToMathML(fancy_error=False)
 

@@ -6,7 +6,7 @@ import pytest
 
 from labs.engine.catalog import Entry, catalog
 from server.articles import Article, ArticleError, render, render_text, tex, words
-from server.formulas import statements
+from server.line_breaks import statements
 
 COURSE = [entry for entry in catalog().values() if entry.package.startswith("labs.")]
 EXPERIMENT = """```experiment

@@ -51,11 +51,17 @@ class Params(BaseModel):
         for name, tunable in cls.tunables.items():
             for choices in tunable.when:
                 for governor, values in choices.items():
-                    if not values or set(values) - _options(cls.tunables.get(governor)):
-                        raise TypeError(
-                            f"{cls.__name__}: {name} acts when {governor} is one of {values}, but "
-                            "these are no options of a choice or a toggle"
-                        )
+                    cls._check_governor(f"{name} acts", governor, values)
+            for governor, units in getattr(tunable, "units", {}).items():
+                cls._check_governor(f"{name} has another unit", governor, tuple(units))
+
+    @classmethod
+    def _check_governor(cls, what: str, governor: str, values: tuple[Value, ...]) -> None:
+        if not values or set(values) - _options(cls.tunables.get(governor)):
+            raise TypeError(
+                f"{cls.__name__}: {what} when {governor} is one of {values}, but these are no "
+                "options of a choice or a toggle"
+            )
 
     @field_validator("*")
     @classmethod

@@ -26,6 +26,7 @@ TEXT_LENGTH = 400
 LONGEST_TEXT = 4000
 """A link holds it: three bytes for a letter in most alphabets, three characters for a byte."""
 ALWAYS: When = ()
+NO_UNITS: Mapping[str, Mapping[Value, str]] = {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,10 +58,17 @@ class Knob(Tunable):
     """A number in [low, high] on a slider. `symbol` is TeX as in the notes."""
 
     unit: str
+    units: Mapping[str, Mapping[Value, str]]
+    """By the name of a choice and its value the unit it has there instead."""
     low: float
     high: float
     step: float
     scale: Scale
+
+    def unit_under(self, values: Mapping[str, Value]) -> str:
+        """The unit under these values of the choices."""
+        found = [units.get(values[name]) for name, units in self.units.items()]
+        return next((unit for unit in found if unit is not None), self.unit)
 
     def position(self, value: float) -> float:
         """Where on the slider, in [0, 1], this value sits.
@@ -169,11 +177,13 @@ class Group:
         *,
         step: float = 0.0,
         scale: Scale = "linear",
+        units: Mapping[str, Mapping[Value, str]] = NO_UNITS,
         **shared: Unpack[Shared],
     ) -> Any:
-        """A number in [low, high] with a slider. `step` is the slider's grain (0: a thousandth)."""
+        """A number in [low, high] with a slider. `step` is the slider's grain (0: a thousandth).
+        What is measured may depend on a choice: `units={"system": {"mass": "m"}}`."""
         own = self._tunable(label or symbol, symbol, **shared)
-        knob = Knob(**own, unit=unit, low=low, high=high, step=step, scale=scale)
+        knob = Knob(**own, unit=unit, units=units, low=low, high=high, step=step, scale=scale)
         return _field(default, knob, ge=low, le=high, allow_inf_nan=False)
 
     def choice(

@@ -10,6 +10,7 @@ from typing import Any
 
 from markdown_it import MarkdownIt
 from markdown_it.renderer import RendererHTML
+from markdown_it.rules_core import StateCore
 from markdown_it.token import Token
 from markdown_it.utils import OptionsDict
 from mdit_py_plugins.dollarmath import dollarmath_plugin
@@ -58,6 +59,7 @@ class _Writer:
         self.symbols = _Symbols(entry.lab.Params)
         self.markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
         self.markdown.use(dollarmath_plugin, allow_digits=False, double_inline=True)
+        self.markdown.core.ruler.before("inline", "first_formula", _shield_first_formula)
         for rule, method in (
             ("math_inline", self._inline),
             ("math_inline_double", self._display),
@@ -154,6 +156,14 @@ class _Symbols:
 def _escape_number(text: str) -> str:
     """A text whose first words are "22. The" begins with a number, not with a list."""
     return re.sub(r"\A(\d+)\. ", r"\1\\. ", text)
+
+
+def _shield_first_formula(state: StateCore) -> None:
+    """A formula at a text's very beginning: before it, the plugin for mathematics looks at the
+    text's last character, and takes a dollar after a digit for a price."""
+    for token in state.tokens:
+        if token.type == "inline" and token.content.startswith("$"):
+            token.content += "\u200b"  # a space without width
 
 
 def _inner(formula: str) -> str:

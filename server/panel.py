@@ -15,7 +15,8 @@ from labs.lab import Action
 from labs.params import Choice, Knob, Params, Text, Tunable, Value
 from server.mailbox import Mailbox
 
-Show = Callable[[Value], None]
+Show = Callable[[Value, str], None]
+"""A value, and its unit."""
 TICKS = 1000
 
 
@@ -25,7 +26,7 @@ class Panel:
     def __init__(self, server: viser.ViserServer, mailbox: Mailbox, world: World) -> None:
         self._gui, self._mailbox = server.gui, mailbox
         self._controls: dict[str, tuple[Any, Show]] = {}
-        self._shown: dict[str, Value] = {}
+        self._shown: dict[str, tuple[Value, str]] = {}
         server.gui.set_panel_label(world.lab.title)
         for name, tunable in world.params.tunables.items():
             if tunable.key and not isinstance(tunable, Text):
@@ -39,9 +40,11 @@ class Panel:
         act."""
         for name, (control, show) in self._controls.items():
             control.visible = params.acts(name)
-            if self._shown.get(name) != (value := getattr(params, name)):
-                show(value)
-                self._shown[name] = value
+            tunable, values = params.tunables[name], vars(params)
+            unit = tunable.unit_under(values) if isinstance(tunable, Knob) else ""
+            if self._shown.get(name) != (values[name], unit):
+                show(values[name], unit)
+                self._shown[name] = values[name], unit
 
     def _add(self, name: str, tunable: Tunable, value: Value) -> tuple[Any, Show]:
         match tunable:
@@ -55,7 +58,7 @@ class Panel:
 
     def _slider(self, name: str, knob: Knob, value: float) -> tuple[Any, Show]:
         slider: Any = self._gui.add_slider(
-            _caption(knob, value),
+            knob.label,
             0.0,
             1.0,
             1 / TICKS,
@@ -65,8 +68,8 @@ class Panel:
         )
         self._wire(slider, name, read=knob.at)
 
-        def show(value: Value) -> None:
-            slider.label = _caption(knob, float(value))
+        def show(value: Value, unit: str) -> None:
+            slider.label = f"{knob.label} = {float(value):.6g} {unit}".rstrip()
             # One that is where it leads already is left alone: the hand may still be on it.
             if knob.at(slider.value) != value:
                 slider.value = _tick(knob, float(value))
@@ -103,7 +106,7 @@ class Panel:
                 self._shown.pop(name, None)
                 self._mailbox.put("params", changes={name: read(control.value)})
 
-        def show(value: Value) -> None:
+        def show(value: Value, unit: str) -> None:
             control.value = write(value)
 
         return control, show
@@ -114,11 +117,6 @@ class Panel:
         @button.on_click
         async def _(_: Any) -> None:
             self._mailbox.put("press", action=action.name)
-
-
-def _caption(knob: Knob, value: float) -> str:
-    """What is set, with its name and unit."""
-    return f"{knob.label} = {value:.6g} {knob.unit}".rstrip()
 
 
 def _tick(knob: Knob, value: float) -> float:

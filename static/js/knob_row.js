@@ -15,6 +15,7 @@ export class KnobRow {
     this.track = element.querySelector(".track");
     this.wrong = element.querySelector(".wrong");
     this.undo = element.querySelector(".undo");
+    this.unit = element.querySelector(".unit");
     this.field.addEventListener("change", () => knobs.commit(tunable.name, this.read(), this));
     this.undo.addEventListener("click", () => knobs.commit(tunable.name, tunable.default, this));
     if (tunable.kind === "knob") this.field.addEventListener("focus", () => this.field.select());
@@ -86,7 +87,15 @@ export class KnobRow {
     const position = positionOf(tunable, value);
     track.value = position;
     track.style.setProperty("--at", position);
-    track.setAttribute("aria-valuetext", `${plain(value)} ${tunable.unit}`.trim());
+    this.showUnit();
+  }
+
+  // It may depend on a choice.
+  showUnit() {
+    const { tunable, unit, track, field } = this;
+    if (!track) return;
+    unit.textContent = unitUnder(tunable, this.knobs.values);
+    track.setAttribute("aria-valuetext", `${field.value} ${unit.textContent}`.trim());
   }
 
   // How the valid value stands to the default.
@@ -107,4 +116,10 @@ export class KnobRow {
     void this.element.offsetWidth; // restarts the animation
     this.element.classList.add("flash");
   }
+}
+
+// The same as `Knob.unit_under`.
+function unitUnder({ unit, units }, values) {
+  const found = Object.entries(units).map(([name, own]) => own[values[name]]);
+  return found.find((own) => own !== undefined) ?? unit;
 }

@@ -81,5 +81,6 @@ export class Knobs {
       }
       if (entry.wanted === undefined) entry.until = 0;
     }
+    for (const { rows } of this.entries.values()) for (const row of rows) row.showUnit();
   }
 }

@@ -261,6 +261,23 @@ def test_differing_names_what_differs() -> None:
     assert Sample().changed_from(Sample()) == {}
 
 
+def test_a_unit_may_depend_on_a_choice() -> None:
+    class Pushed(Params):
+        drive: str = KNOBS.choice("motor", {"motor": "Motor", "cart": "Cart"}, "Drive")
+        """What pushes."""
+        most: float = KNOBS.knob(1.0, 0.0, 9.0, "u", "N·m", units={"drive": {"cart": "N"}})
+        """At most."""
+
+    most = Pushed.tunables["most"]
+    assert isinstance(most, Knob)
+    assert [most.unit_under({"drive": drive}) for drive in ("motor", "cart")] == ["N·m", "N"]
+    with pytest.raises(TypeError, match="Astray: more has another unit when drive is one of"):
+
+        class Astray(Pushed):
+            more: float = KNOBS.knob(1.0, 0.0, 9.0, "m", units={"drive": {"car": "N"}})
+            """More."""
+
+
 def test_a_bare_field_is_refused_when_the_class_is_made() -> None:
     with pytest.raises(TypeError, match="Bare: make other with a Group"):
 

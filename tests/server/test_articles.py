@@ -66,6 +66,10 @@ def test_a_formula_breaks_between_its_terms_alone(source: str, pieces: list[list
     assert statements(source) == pieces
 
 
+def test_a_text_may_begin_with_a_formula_and_end_with_a_number(entry: Entry) -> None:
+    assert "<math><mi>M</mi></math> is 1.40 m²" in write(entry, "$M$ is 1.40 m²").html
+
+
 def test_bad_tex_names_the_article_and_the_formula(entry: Entry) -> None:
     with pytest.raises(ArticleError, match=r"joint-control.*\\\\nonsense"):
         write(entry, "Here $\\nonsense{x}$.")

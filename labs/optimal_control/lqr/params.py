@@ -30,7 +30,15 @@ class LqrParams(Params):
     system: str = SYSTEM.choice("cart-pole", LINEAR_SYSTEMS, "System", key=True)
     """What is to be kept at rest."""
     deviation: float = SYSTEM.knob(
-        0.3, -3.2, 3.2, "\\Delta x_0", "rad, m", "Start off by", step=0.01, key=True
+        0.3,
+        -3.2,
+        3.2,
+        "\\Delta x_0",
+        "rad",
+        "Start off by",
+        step=0.01,
+        key=True,
+        units={"system": {"mass": "m"}},
     )
     """Of the pole, the pendulum, the mass, or every joint of the UR5, at rest."""
     period: float = SYSTEM.choice(0.02, PERIODS, "Time step", "T", "s", effect="solve")
@@ -58,7 +66,17 @@ class LqrParams(Params):
         when=TURNING,
     )
     """Q's weight of the velocity of what turns."""
-    r: float = WEIGHTS.knob(0.1, 1e-4, 1e4, "r", "1/N², 1/(N·m)²", "Control", scale="log", key=True)
+    r: float = WEIGHTS.knob(
+        0.1,
+        1e-4,
+        1e4,
+        "r",
+        "1/(N·m)²",
+        "Control",
+        scale="log",
+        key=True,
+        units={"system": {"cart-pole": "1/N²", "mass": "1/N²"}},
+    )
     """R = r I: what force or torque costs."""
     policy: str = HORIZON.choice("steady", LQR_POLICIES, "Policy", key=True)
     """The steady state's gain for ever, or those of N steps: all in turn and then over again, or
@@ -76,11 +94,12 @@ class LqrParams(Params):
         0.5,
         200.0,
         "u_{max}",
-        "N, N·m",
+        "N·m",
         "Strongest control",
         scale="log",
         key=True,
         when=OWN_LIMIT,
+        units={"system": {"cart-pole": "N", "mass": "N"}},
     )
     """Of the cart, the pendulum and the mass; the UR5's joints have motors of their own."""
     push_force: float = WORLD.knob(

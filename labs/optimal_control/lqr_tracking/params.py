@@ -52,18 +52,34 @@ class TrackingParams(Params):
     preview: float = POLICY.knob(60.0, 0.0, 100.0, "N", "steps", "Preview", step=1.0, key=True)
     """Steps of 20 ms that the policy sees ahead. With none it is the ghost's."""
     position_weight: float = POLICY.knob(
-        100.0, 1.0, 1e4, "Q_q", "1/rad², 1/m²", "Position weight", scale="log"
+        100.0,
+        1.0,
+        1e4,
+        "Q_q",
+        "1/rad²",
+        "Position weight",
+        scale="log",
+        units={"robot": {"cart-pole": "1/rad², 1/m²"}},
     )
     """Cost of a squared error of position, the same for all joints."""
     velocity_weight: float = POLICY.knob(
-        1.0, 0.01, 100.0, "Q_v", "s²/rad², s²/m²", "Velocity weight", scale="log"
+        1.0,
+        0.01,
+        100.0,
+        "Q_v",
+        "s²/rad²",
+        "Velocity weight",
+        scale="log",
+        units={"robot": {"cart-pole": "s²/rad², s²/m²"}},
     )
     """Cost of a squared error of velocity, the same for all joints."""
     effort_weight: float = POLICY.knob(
         20.0, 0.1, 1e4, "R", "", "Effort weight", scale="log", key=True
     )
     """Cost of a control that differs from the reference control by the motor's limit."""
-    lean: float = LINEAR_COSTS.knob(0.0, -20.0, 20.0, "q", "1/rad, 1/m", "Lean", step=0.1)
+    lean: float = LINEAR_COSTS.knob(
+        0.0, -20.0, 20.0, "q", "1/rad", "Lean", step=0.1, units={"robot": {"cart-pole": "1/m"}}
+    )
     """Linear cost of the place of the shoulder, or of the cart: positive pushes it back."""
     price: float = LINEAR_COSTS.knob(0.0, -20.0, 20.0, "s", "", "Price", step=0.1)
     """Linear cost of the effort at the shoulder, or the cart: positive favours negative."""

@@ -5,6 +5,7 @@ import re
 from playwright.sync_api import Page, expect
 
 from tests.browser.conftest import screenshot
+from tests.browser.lab_page import LabPage
 
 
 def test_the_course_lies_open(page: Page) -> None:
@@ -17,6 +18,7 @@ def test_the_course_lies_open(page: Page) -> None:
     card.click()
     expect(page).to_have_url(re.compile("/labs/joint-control"))
     expect(page.get_by_role("heading", level=1)).to_have_text("Joint motion control")
+    LabPage(page, scene=False).wait_live()
     page.goto("/")
     expect(page.locator(".step.opened")).to_have_count(1)
     expect(page.locator("#chapter-1 .progress")).to_have_text(re.compile("1 of"))

@@ -63,7 +63,8 @@ def test_finite_values_give_finite_colours() -> None:
 
 def test_heat_maps_on_the_page_wear_the_same_colours() -> None:
     script = Path(__file__).parents[2] / "static" / "js" / "plots" / "heatmap.js"
-    tones = re.findall(r'"#([0-9a-f]{6})"', script.read_text(encoding="utf-8"))
+    (line,) = re.findall(r"const SEQUENTIAL = (.*)", script.read_text(encoding="utf-8"))
+    tones = re.findall(r'"#([0-9a-f]{6})"', line)
     assert len(tones) == 9
     colors = np.round(255 * sequential(np.linspace(0.0, 1.0, len(tones)))).astype(int)
     assert tones == ["{:02x}{:02x}{:02x}".format(*color) for color in colors.tolist()]

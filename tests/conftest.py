@@ -1,8 +1,8 @@
-"""What all tests share: two lanes, the sample labs, and real servers in processes of their own.
+"""What all tests share: lanes, the sample labs, and real servers in processes of their own.
 
-The whole suite runs in two processes (`pytest-xdist`); a part of it, as `pytest PATH::TEST`, in the
-one that was started. A server takes seconds to start: there is one for all tests that need the same
-settings."""
+The whole suite runs in three processes (`pytest-xdist`); a part of it, as `pytest PATH::TEST`, in
+the one that was started. A server takes seconds to start: there is one for all tests that need the
+same settings."""
 
 import os
 
@@ -17,14 +17,23 @@ from xdist.scheduler import LoadScopeScheduling
 import labs  # noqa: F401  (before NumPy: it says how many threads BLAS gets)
 from tests.served import Served, until
 
-ORDER = ("browser", "labs/test_contract.py", "labs/test_live_sessions.py", "labs", "")
-"""What begins first. Browser tests are one piece and take longest; the other lane begins with labs
-that need nothing compiled, while a server of the first compiles the rest."""
+ORDER = (
+    "browser/test_every_lab.py",
+    "labs/test_contract.py",
+    "browser",
+    "server",
+    "labs/test_live_sessions.py",
+    "labs",
+    "",
+)
+"""What begins first: the longest pieces. The contract's begins with labs that need nothing
+compiled, while a server of the first lane compiles the rest."""
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """Two lanes for the whole suite, and none for a part."""
-    return 2 if config.args_source is pytest.Config.ArgsSource.TESTPATHS else 0
+    """Three lanes for the whole suite, and none for a part. Two cores have room for a third: tests
+    of the browser and the server wait for simulated time more than they compute."""
+    return 3 if config.args_source is pytest.Config.ArgsSource.TESTPATHS else 0
 
 
 def pytest_xdist_setupnodes() -> None:
@@ -40,12 +49,14 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 class Lanes(LoadScopeScheduling):  # type: ignore[misc]
-    """What stays together in one lane: all tests of the browser, of the server, else of a file."""
+    """What stays together in one lane: all tests of the server, almost all of the browser, else
+    those of a file."""
 
     def _split_scope(self, nodeid: str) -> str:
         path = nodeid.partition("::")[0].removeprefix("tests/")
         folder = path.partition("/")[0]
-        return path if folder == "labs" else folder
+        alone = folder == "labs" or path == "browser/test_every_lab.py"
+        return path if alone else folder
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Lanes:

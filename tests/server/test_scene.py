@@ -16,7 +16,7 @@ from server.mailbox import Mailbox
 from server.messages import View
 from server.nodes import COLORS, DARK, LIGHT, blend_with_background
 from server.viser_scene import ViserScene
-from tests.served import Served
+from tests.served import Served, until
 from tests.viser_client import PROTOCOL, SceneClient, camera, message
 
 

@@ -100,6 +100,18 @@ def lab_of(module: str) -> str:
     return ".".join(module.split(".")[:3])
 
 
+def test_no_merge_is_left_unresolved() -> None:
+    marks = ("<" * 7 + " ", ">" * 7 + " ")
+    files = [*texts("labs", "server", "static", "tests", ".ci"), *ROOT.glob("*.*")]
+    left = [
+        name_of(path)
+        for path in files
+        if path.is_file()
+        and any(line.startswith(marks) for line in path.read_text("utf-8").splitlines())
+    ]
+    assert not left
+
+
 def test_imports_go_down_and_no_lab_imports_another() -> None:
     wrong = []
     for path in sources("labs"):

@@ -72,13 +72,6 @@ def served() -> Iterator[Served]:
 
 
 @pytest.fixture(scope="session")
-def small() -> Iterator[Served]:
-    """A server with a single place."""
-    with Served(ORCLAB_MAX_SESSIONS="1") as server:
-        yield server
-
-
-@pytest.fixture(scope="session")
 def impatient() -> Iterator[Served]:
     """A server that soon ends what nobody watches, or nobody touches."""
     with Served(ORCLAB_VIEWERLESS_SECONDS="3", ORCLAB_UNTOUCHED_SECONDS="5") as server:
@@ -89,14 +82,15 @@ def impatient() -> Iterator[Served]:
 def _mortal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     with (
         (tmp_path_factory.mktemp("mortal") / "stderr").open("w+") as stderr,
-        Served(stderr=stderr) as server,
+        Served(stderr=stderr, ORCLAB_MAX_SESSIONS="1") as server,
     ):
         yield server
 
 
 @pytest.fixture
 def mortal(_mortal: Served) -> Served:
-    """A server for tests that end it, or start it anew; each finds it running."""
+    """A server with a single place, for tests that fill or end it, or start it anew; each finds it
+    running."""
     if not _mortal.running:
         _mortal.start()
     until(lambda: _mortal.health()["spares"] == 1 and _mortal.health()["sessions"] == 0)

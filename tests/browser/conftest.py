@@ -52,6 +52,10 @@ def visit(chromium: Browser) -> Iterator[Visit]:
     expect.set_options(timeout=1000 * PATIENCE)
     yield make
     for context in opened:
+        for page in context.pages:
+            page.goto(
+                "about:blank"
+            )  # a page that leaves ends its session; one that is shot does not
         context.close()
     assert not errors
 

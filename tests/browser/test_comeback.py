@@ -12,7 +12,7 @@ from tests.served import Served, until
 
 
 def test_a_killed_worker_comes_back_with_the_same_parameters(page: Page, served: Served) -> None:
-    until(lambda: served.health()["spares"] == 1 and served.health()["sessions"] == 0)
+    until(lambda: served.health()["workers"] == served.health()["spares"] == 1)
     (worker,) = served.listeners()
     lab = LabPage(page).open("joint-control", "?kp=640&controller=pid")
     expect(lab.scene.locator("canvas").first).to_be_visible()
@@ -42,9 +42,9 @@ def test_a_restarted_server_is_found_again(visit: Visit, mortal: Served) -> None
     assert lab.status()["id"] != old
 
 
-def test_a_full_house_says_so_and_lets_in_when_there_is_room(visit: Visit, small: Served) -> None:
-    page = visit(small).new_page()
-    with small.session("oscillator"):
+def test_a_full_house_says_so_and_lets_in_when_there_is_room(visit: Visit, mortal: Served) -> None:
+    page = visit(mortal).new_page()
+    with mortal.session("oscillator"):
         page.goto("/labs/joint-control")
         expect(page.locator("body")).to_contain_text("all 1 places are taken")
         screenshot(page, "full")

@@ -18,6 +18,7 @@ from tests.served import Served
 
 def test_the_robot_is_seen_and_moves(page: Page) -> None:
     lab = LabPage(page).open("joint-control")
+    lab.told(when=lambda s: s["t"] > 5)  # the camera has seen all of the motion, and stands
     height, width, _ = lab.pixels("#robot").shape
     middle = (slice(height // 5, height), slice(width // 6, width * 2 // 3))
     moved, before = 0.0, lab.pixels("#robot")[middle]

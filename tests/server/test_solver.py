@@ -272,7 +272,7 @@ def test_whatever_the_pace_was_the_run_is_replayed_bit_for_bit(served: Served) -
 
 
 def test_a_replaced_worker_keeps_the_pace_and_the_pause(served: Served) -> None:
-    until(lambda: served.health()["spares"] == 1)
+    until(lambda: served.health()["workers"] == served.health()["spares"] == 1)
     before = set(served.listeners())
     with served.session("descent") as session, session.stream() as stream:
         session.command("solver_pace", pace=5)

@@ -55,7 +55,7 @@ from typing import Any
 from labs.engine.catalog import Entry
 from labs.errors import LabError
 from labs.lab import Lab
-from labs.params import Params, Value
+from labs.params import Knob, Params, Value
 from labs.plots import Readout
 from server import predictions
 from server import toml_values as toml
@@ -160,7 +160,7 @@ class _Reader:
             self._pace(data),
             settings,
             compare,
-            _compared(self.lab.Params, compare),
+            _compared(self.lab.Params().change(settings), compare),
         )
         if "predict" not in data:
             return experiment
@@ -199,17 +199,19 @@ class _Reader:
         return pace
 
 
-def _compared(params: type[Params], compare: Mapping[str, Value]) -> str:
+def _compared(params: Params, compare: Mapping[str, Value]) -> str:
     """What is otherwise, as HTML: k_p = 400 N/m, in symbols where there are some."""
     described = {tunable["name"]: tunable for tunable in params.describe()}
+    values = params.model_dump() | dict(compare)
     parts = []
     for name, value in compare.items():
         tunable = described[name]
         symbol = tunable.get("symbol")
         labels = {o["value"]: o["label"] for o in tunable.get("options", [])}
         shown = f"{value:g}" if type(value) in (int, float) else str(labels.get(value, value))
-        unit = tunable.get("unit", "")
-        unit = f" {unit}" if unit and "," not in unit else ""  # of one system, not of several
+        knob = params.tunables[name]
+        unit = knob.unit_under(values) if isinstance(knob, Knob) else ""
+        unit = f" {unit}" if unit else ""
         named = tex(symbol) if symbol else escape(tunable["label"])
         parts.append(f"{named} = {escape(shown + unit)}")
     return ", ".join(parts)

@@ -152,7 +152,7 @@ def form(predict: Prediction | None, number: int) -> str:
             return ""
         case Choice(choices=choices, ask=ask):
             inside = "".join(
-                f'<button type="button" data-choice="{i}" aria-pressed="false">{text}</button>\n'
+                f'<button type="button" data-choice="{i}" aria-pressed="false"><span>{text}</span></button>\n'
                 for i, text in enumerate(choices)
             )
             return _form("choice", ask or "Your guess", inside, number)

@@ -18,7 +18,9 @@ export function number(value, digits = 4) {
 
 // As short as it goes without loss, for fields one types into.
 export function plain(value) {
-  return String(Number(Number(value).toPrecision(12)));
+  const exact = Number(Number(value).toPrecision(12));
+  const size = Math.abs(exact);
+  return size > 0 && size < 1e-3 ? exact.toExponential() : String(exact);
 }
 
 // Four significant digits and no zeros after them, for the midst of a formula.

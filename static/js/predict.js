@@ -168,7 +168,7 @@ export class Prediction {
     if (asked.kind === "choice") {
       if (guess === outcome) return ["Right."];
       const right = this.form.querySelector(`[data-choice="${outcome}"]`);
-      return ["Not so. The answer: ", ...[...right.childNodes].map((node) => node.cloneNode(true))];
+      return ["Not so. The answer: ", right.firstElementChild.cloneNode(true)];
     }
     if (asked.kind === "curve") return [`Your curve is off by ${this.withUnit(outcome)} (root mean square).`];
     const off = guess - outcome;

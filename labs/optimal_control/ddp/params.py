@@ -25,7 +25,7 @@ class DdpParams(MotionParams):
         "warm", {"warm": "Warm: the present solution", "cold": "Cold: the first guess"}, "Start"
     )
     """What a change of the problem is solved from."""
-    guess: float = SOLVER.knob(0.0, -1.0, 1.0, "A", "u_0", "First guess", step=0.01)
+    guess: float = SOLVER.knob(0.0, -1.0, 1.0, "A", "u₀", "First guess", step=0.01)
     """Size of the controls guessed at first, u = u_ref + A u_0 cos(2 pi f_0 t)."""
     guess_rate: float = SOLVER.knob(0.0, 0.0, 2.0, "f_0", "Hz", "Its frequency", step=0.05)
     """Of the first guess; at 0 it is a constant push."""
@@ -45,7 +45,7 @@ class DdpParams(MotionParams):
     """Viscous friction at every joint that the plan does not know of."""
     noise: float = WORLD.knob(0.0, 0.0, 0.05, r"\sigma_x", "rad", "Sensor noise", scale="log")
     """Standard deviation of the measured angles; of the velocities it is 10/s times this."""
-    noise_torque: float = WORLD.knob(0.0, 0.0, 1.0, r"\sigma_u", "u_0", "Torque noise", scale="log")
+    noise_torque: float = WORLD.knob(0.0, 0.0, 1.0, r"\sigma_u", "u₀", "Torque noise", scale="log")
     """Standard deviation of what the motors add to the control, the same in both runs."""
     push: float = WORLD.knob(0.5, -5.0, 5.0, "p_{push}", "N·s", "Push", step=0.05)
     """Impulse a push gives the tip of both robots, along y."""

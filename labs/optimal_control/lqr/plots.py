@@ -67,7 +67,7 @@ PLOTS: tuple[Plot, ...] = (
     Curves(
         "Time to solve",
         "N",
-        "seconds",
+        "time [s]",
         Trace("horizons", "riccati", "Riccati, slope", "marked", 1, "riccati_slope"),
         Trace("horizons", "at_once", "least squares, slope", "marked", 2, "at_once_slope"),
         log_x=True,

@@ -163,7 +163,7 @@ class LqrTracking(Lab[TrackingParams, TrackingState]):
             "affine": now.k,
             "lap_cost": float(cost),
             "ghost_lap_cost": float(ghost_cost),
-            "optimum": full_preview(params.settings).lap_cost,
+            "optimum": round(full_preview(params.settings).lap_cost, 10),  # no rounding errors
         }
         if state.costs.shape[1] == params.samples:
             measured |= {"lap_paid": float(cost), "ghost_lap_paid": float(ghost_cost)}

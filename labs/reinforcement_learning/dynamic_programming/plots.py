@@ -20,8 +20,8 @@ POINTS, PIXELS = 250, 51
 
 def _traces(x: str, y: str) -> tuple[Trace, ...]:
     return tuple(
-        Trace(f"{x}_{method}", f"{y}_{method}", name, series=i + 1)
-        for i, (method, name) in enumerate(ITERATION_METHODS.items())
+        Trace(f"{x}_{method}", f"{y}_{method}", method, series=i + 1)
+        for i, method in enumerate(ITERATION_METHODS)
     )
 
 
@@ -53,7 +53,7 @@ PLOTS: tuple[Plot, ...] = (
     ),
     TimeSeries(
         "Cost of this run",
-        "cost",
+        "",
         Line("paid", r"\text{paid}"),
         Line("promised", r"\text{paid} + \gamma^k V(x_k)", "limit"),
     ),

@@ -116,7 +116,7 @@ class Markov(Lab[MarkovParams, MarkovState]):
             "far": far,
             "visited": visited,
             "steps": float(walk.steps),
-            "off": 50.0 * float(np.abs(walk.mu - far).sum()),
+            "off": round(50.0 * float(np.abs(walk.mu - far).sum()), 10),  # no rounding errors
             "visits_off": 50.0 * float(np.abs(visited - far).sum()),
             "step_cost": float(far @ process.C),
         }
@@ -125,8 +125,8 @@ class Markov(Lab[MarkovParams, MarkovState]):
         return measured | {name: float(value[0]) for name, value in known.items()}
 
     def fields(self, params: MarkovParams, state: MarkovState) -> Mapping[str, np.ndarray]:
-        process, (x, _) = params.process, params.chosen_states
-        return discount_curves(process, params.gamma, x) | {
+        process = params.process
+        return discount_curves(process, params.gamma) | {
             "mu": state.walk.mu,
             "far": process.long_run[state.walk.start],
             "re": process.eigenvalues.real,

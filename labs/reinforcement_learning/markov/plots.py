@@ -13,16 +13,16 @@ PLOTS: tuple[Plot, ...] = (
     Bars("Distribution now, and in the long run", "mu", r"\mu_k", "", marks="far", names="state"),
     TimeSeries(
         "Probability of each state",
-        "long run dashed",
+        "",
         Line("mu", r"\mu"),
-        Line("far", r"\bar\mu", "dash"),
+        Line("far", r"\text{long run}", "dash"),
         select="state",
     ),
     TimeSeries(
         "Share of the token's visits",
-        "long run dashed",
+        "",
         Line("visited", r"f"),
-        Line("far", r"\bar\mu", "dash"),
+        Line("far", r"\text{long run}", "dash"),
         select="state",
     ),
     Curves(
@@ -54,9 +54,8 @@ PLOTS: tuple[Plot, ...] = (
     Curves(
         "Mean cost (1 − γ) V over the discount",
         "γ",
-        "cost of a step",
+        "mean cost",
         Trace("gammas", "means", "{state}", series=1),
-        Trace("gammas", "mean", "chosen state", "marked"),
         Trace("now", "span", "γ now", "dash", 2),
     ),
     Matrix("Action values, a row a state", "Q", r"Q", shade=True, rows="state"),
@@ -69,14 +68,13 @@ PLOTS: tuple[Plot, ...] = (
 )
 
 
-def discount_curves(process: RewardProcess, gamma: float, x: int) -> dict[str, np.ndarray]:
-    """The mean cost of a step over the discount: of every state, of state x (or the last, where
-    there is no x), and the line at the discount of now."""
+def discount_curves(process: RewardProcess, gamma: float) -> dict[str, np.ndarray]:
+    """The mean cost of a step over the discount, of every state, and the line at the discount of
+    now."""
     means = mean_costs(process.P, process.C, GAMMAS, process.classes)
     return {
         "gammas": GAMMAS,
         "means": means,
-        "mean": means[:, min(x, len(process.P) - 1)],
         "now": np.full(2, gamma),
         "span": np.array([means.min(), means.max()]),
     }

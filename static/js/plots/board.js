@@ -33,7 +33,7 @@ export class Board {
     this.readouts = new Readouts(lab.plots.filter((p) => p.kind === "Readout"), document.getElementById("tiles"));
     this.plots = lab.plots.filter((p) => p.kind in KINDS).map((p) => new KINDS[p.kind](p, this));
     document.getElementById("plots").append(...this.plots.map((plot) => plot.section));
-    this.shelf = new Shelf(lab.slug, this.plots, () => this.refresh());
+    this.shelf = new Shelf(lab.slug, this.plots, () => this.rearranged());
     this.series = this.plots.filter((plot) => plot instanceof TimeSeries);
     this.pictured = this.plots.filter((plot) => plot.update);
     setInterval(() => summarise(this.shelf.shown), WORDS_EVERY);
@@ -143,6 +143,12 @@ export class Board {
     this.refresh();
   }
 
+  // Other plots are in view.
+  rearranged() {
+    this.writeSelectors();
+    this.refresh();
+  }
+
   // Draws at the next frame, however often it is asked to.
   refresh() {
     if (this.unzoomButton) this.unzoomButton.hidden = !this.zoomed;
@@ -199,12 +205,13 @@ export class Board {
     return select ? this.selection[select] ?? "all" : null;
   }
 
+  // What the plots in view choose from.
   writeSelectors() {
     const host = document.getElementById("selectors");
-    if (!host) return;
+    if (!host || !this.run) return;
     const counts = {};
-    for (const { plot } of this.series) {
-      if (!plot.select) continue;
+    for (const { plot, section } of this.series) {
+      if (!plot.select || section.hidden) continue;
       const n = Math.max(...plot.lines.map((line) => this.run.components(line.channel) ?? 0));
       if (n > 1) counts[plot.select] = Math.max(counts[plot.select] ?? 0, n);
     }

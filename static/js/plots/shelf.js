@@ -55,6 +55,7 @@ export class Shelf {
     this.watched = plots.slice(0, this.room);
     this.pinned = [...this.watched, ...this.shown.filter((plot) => !this.watched.includes(plot))];
     this.show();
+    this.tabs[this.plots.indexOf(this.watched[0])]?.scrollIntoView({ block: "nearest", inline: "start" });
   }
 
   pin(plot) {

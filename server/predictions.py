@@ -152,7 +152,8 @@ def form(predict: Prediction | None, number: int) -> str:
             return ""
         case Choice(choices=choices, ask=ask):
             inside = "".join(
-                f'<button type="button" data-choice="{i}" aria-pressed="false"><span>{text}</span></button>\n'
+                f'<button type="button" data-choice="{i}" aria-pressed="false">'
+                f"<span>{text}</span></button>\n"
                 for i, text in enumerate(choices)
             )
             return _form("choice", ask or "Your guess", inside, number)

@@ -171,7 +171,11 @@ CURVE = 'watch = "Error"\n[predict]\nask = "Sketch it"\ncurve = "error[1]"\nrang
 @pytest.mark.parametrize(
     ("more", "told", "shown"),
     [
-        (CHOICE, {"kind": "choice", "answer": 0}, 'data-choice="1" aria-pressed="false">rises<'),
+        (
+            CHOICE,
+            {"kind": "choice", "answer": 0},
+            'data-choice="1" aria-pressed="false"><span>rises<',
+        ),
         (NUMBER + 'channel = "error[1]"', {"channel": "error[1]", "of": "last"}, 'inputmode="dec'),
         (NUMBER + 'readout = "RMS error"', {"channel": "rms_error", "unit": "rad"}, "Error</p>"),
         (NUMBER + "answer = 3", {"kind": "number", "channel": "", "answer": 3.0}, ">rad<"),

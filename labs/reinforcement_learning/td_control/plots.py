@@ -32,7 +32,7 @@ def _curves(title: str, y_label: str, mean: str, *edges: str) -> Curves:
 PLOTS: tuple[Plot, ...] = (
     _curves("Cost of an episode while learning", "J", "online", "online_low", "online_high"),
     _curves("Cost of the greedy policy, median", "J", "offline"),
-    _curves("Distance to Q*", "mean (root of squares); dashed: largest", "off", "most"),
+    _curves("Distance to Q*", "RMS; dashed: largest", "off", "most"),
     HeatMap("Q of the learner shown", "x", "y", "q", *AXES, "Q", gaps=True),
     HeatMap("Greedy policy", "x", "y", "value", *AXES, "min Q", gaps=True, arrows="policy"),
     HeatMap("Visits", "x", "y", "visits", *AXES, "log₁₀(1 + n)", gaps=True),

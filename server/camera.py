@@ -21,6 +21,8 @@ MEMORY = 2.5
 """[s] for which what was in view keeps its place, and up to twice as long."""
 WORTH_IT = 0.75
 """The camera comes nearer again if it can, to this part of its distance."""
+NEARER = 0.9
+"""And at once where something new is drawn, or a run begins."""
 SAME = 2e-3
 """Poses that differ by less, in parts of the distance, are one."""
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) / np.sqrt(3.0)
@@ -96,7 +98,7 @@ class Camera:
             self._bounds = np.array([low - room, high + room])
         reach = extremes(np.clip(local, *self._bounds), window)
         if changed and not begins:
-            begins = self._distance(reach) < WORTH_IT * self._distance(self._reach)
+            begins = self._distance(reach) < NEARER * self._distance(self._reach)
         jumps = begins or resized
         if jumps:
             self._reach = self._latest = self._before = reach

@@ -98,6 +98,7 @@ export class Shelf {
 // Scrolls the row of tabs, and nothing else, to where this one is whole.
 function reveal(tab) {
   const row = tab.parentElement;
+  if (!row) return;
   const [own, all] = [tab, row].map((part) => part.getBoundingClientRect());
   row.scrollLeft += Math.min(0, own.left - all.left) + Math.max(0, Math.min(own.right - all.right, own.left - all.left));
 }

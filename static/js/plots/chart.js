@@ -107,7 +107,7 @@ function ticks(low, high, most) {
 // decades and the numbers do not touch.
 function decades(low, high, most) {
   const stride = Math.max(1, Math.ceil((high - low) / Math.max(1, most)));
-  const room = (fewest) => high - low <= 2 && Math.log10(fewest) * most > 0.53 * (high - low);
+  const room = (fewest) => high - low <= 2 && Math.log10(fewest) * most > 0.48 * (high - low);
   const steps = (room(2) ? [1, 2, 5] : room(3) ? [1, 3] : [1]).map(Math.log10);
   const found = [];
   for (let k = Math.floor(low / stride) * stride; k <= high; k += stride) {

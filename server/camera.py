@@ -21,6 +21,9 @@ MEMORY = 2.5
 """[s] for which what was in view keeps its place, and up to twice as long."""
 WORTH_IT = 0.75
 """The camera comes nearer again if it can, to this part of its distance."""
+ELSEWHERE = 0.1
+"""Where something new is drawn, or a run begins, it forgets what was if it fits better from a place
+that is so far away, in parts of its distance."""
 SAME = 2e-3
 """Poses that differ by less, in parts of the distance, are one."""
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) / np.sqrt(3.0)
@@ -98,7 +101,7 @@ class Camera:
         if changed and not begins:
             begins = self._distance(reach) < WORTH_IT * self._distance(self._reach)
         jumps = begins or resized
-        if jumps:
+        if jumps or (changed and self._is_elsewhere(reach, window)):
             self._reach = self._latest = self._before = reach
             self._due = now + MEMORY
         self._remember(reach, now)
@@ -110,6 +113,11 @@ class Camera:
         else:
             self._at = self._at + GLIDE * (goal - self._at)
         self._move()
+
+    def _is_elsewhere(self, reach: np.ndarray, window: Window) -> bool:
+        """Whether this frame alone is seen best from another place than all that was."""
+        away = nearest(reach, window) - nearest(self._reach, window)
+        return float(np.linalg.norm(away)) > ELSEWHERE * self._distance(self._reach)
 
     def _remember(self, reach: np.ndarray, now: float) -> None:
         """Extremes of this frame. A plan's first guesses may reach far, and never again."""

@@ -93,7 +93,9 @@ class _Reader:
                 f"answer = {answer!r}: takes a whole number, 0 to {len(choices) - 1}"
             )
         ask = self._inline(text(data, "ask", ""))
-        return Choice(tuple(self._inline(c) for c in choices), answer, ask)
+        return Choice(
+            tuple(self._inline(text({"choices": c}, "choices")) for c in choices), answer, ask
+        )
 
     def _amount(self, data: dict[str, Any]) -> Number:
         sources = ("readout", "channel", "answer")

@@ -23,6 +23,10 @@ def text(data: Mapping[str, Any], key: str, default: str | None = None) -> str:
     value = data.get(key, default)
     if not isinstance(value, str):
         raise ArticleError(f"{key} has the wrong type: it takes a text")
+    if not value.replace("\n", "").isprintable():
+        raise ArticleError(
+            f"{key} = {value!r} holds a control character: in TOML, TeX's \\ is \\\\"
+        )
     return value
 
 

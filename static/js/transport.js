@@ -81,7 +81,7 @@ export class Transport {
   }
 
   showPace({ running, trouble, capped, real_time_factor: factor }) {
-    const moving = `${capped ? "↓" : ""}${factor.toFixed(2)}×`;
+    const moving = `${capped ? "↓" : ""}${factor.toFixed(2)}×`; // as wide as ever: the row stays one
     const text = trouble ? "stopped" : running ? moving : "paused";
     if (this.pace.textContent !== text) this.pace.textContent = text;
     this.pace.classList.toggle("capped", running && capped);

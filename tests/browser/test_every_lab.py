@@ -16,6 +16,10 @@ CUT = """() => [...document.querySelectorAll(".formula")]
   .map(formula => formula.textContent)"""
 SHIPPED = [entry for entry in catalog().values() if entry.package.startswith("labs.")]
 
+DIGITS = ".plot.watched td"
+LOWEST = """() => Math.min(1000, ...[...document.querySelectorAll(".plot.watched .canvas")]
+  .map(plot => plot.clientHeight))"""
+"""[px] How low the lowest drawing is that an experiment watches."""
 KNOBS = ".knob.set:not([hidden])"
 FIT = """selector => {
   const boxes = [...document.querySelectorAll(selector)].map(knob => knob.getBoundingClientRect());
@@ -38,6 +42,9 @@ def test_every_experiment_and_a_slider_set_what_they_say(page: Page, entry: Entr
         expect(page.locator(".plot.watched")).to_have_count(len(experiment.watch))
         if experiment.watch:
             assert lab.whole(".plot.watched"), experiment.title
+            if page.locator(DIGITS).count():
+                assert lab.whole(DIGITS), f"{experiment.title}: a matrix is cut"
+            assert page.evaluate(LOWEST) > 80, f"{experiment.title}: its legend leaves no room"
             lab.wait_filled(".plot.watched")
         if experiment.highlight:
             # A label may name what was chosen: "Greedy, {first}" reads "Greedy, SARSA".

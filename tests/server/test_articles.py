@@ -224,6 +224,10 @@ def test_titles_are_escaped(entry: Entry) -> None:
         (NUMBER + "channel = 'error'\nof = 'mean'", "takes one of last, min, max, peak"),
         (CURVE.replace("Error", "Energy"), "no time series that is watched shows the channel"),
         (CURVE.replace("-1, 1", "1, -1"), "range = [1, -1]: takes two numbers, [lowest, highest]"),
+        (
+            NUMBER.replace("Error", "$\\theta$") + "answer = 1",
+            "ask = '$\\theta$' holds a control character",
+        ),
         ("wach = 1", "does not know wach"),
         ("watch = 1", "watch has the wrong type"),
         ("set = 1", "set has the wrong type"),

@@ -135,10 +135,15 @@ def test_a_change_moves_the_camera_nearer_only_if_it_is_worth_it() -> None:
     camera = Camera(viewer)  # type: ignore[arg-type]
     follow(camera, points)
     fitted = viewer.camera.position
-    follow(camera, 0.9 * points, changed=True)
+    follow(camera, 0.95 * points, changed=True)
     np.testing.assert_array_equal(viewer.camera.position, fitted)
-    follow(camera, 0.5 * points, changed=True)
-    assert np.linalg.norm(viewer.camera.position) < 0.75 * np.linalg.norm(fitted)
+    follow(camera, 0.82 * points, changed=True)  # glides
+    assert np.linalg.norm(viewer.camera.position) > 0.9 * np.linalg.norm(fitted)
+    for _ in range(60):
+        follow(camera, 0.82 * points)
+    assert np.linalg.norm(viewer.camera.position) < 0.9 * np.linalg.norm(fitted)
+    follow(camera, 0.4 * points, changed=True)
+    assert np.linalg.norm(viewer.camera.position) < 0.6 * np.linalg.norm(fitted)
 
 
 def test_what_went_far_once_is_forgotten() -> None:

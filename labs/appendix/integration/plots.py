@@ -82,11 +82,11 @@ PLOTS = (
     ),
     TimeSeries("Energy", "J", *_lines("energy"), Line("energy", r"\text{exact}", "limit")),
     Bars("Order conditions of your tableau", "conditions", r"\text{off by}", ""),
-    Readout("own_order", "Order of your tableau", ""),
+    Readout("own_order", "Order of your tableau", "", whole=True),
     Readout("own_sum", "Sum of its b", ""),
     Readout("reach", "h |λ|, fastest swing", ""),
-    Readout("newton", "Newton iterations in a step", ""),
-    Readout("going", "Methods still going", "of 8"),
+    Readout("newton", "Newton iterations in a step", "", whole=True),
+    Readout("going", "Methods still going", "of 8", whole=True),
 )
 
 

@@ -40,7 +40,7 @@ def _angle(i: int) -> Any:
         0.0,
         -3.14,
         3.14,
-        f"q_{i} - q_{i}^{{home}}",
+        f"\\Delta q_{i}",
         "rad",
         f"Joint {i}",
         step=0.01,
@@ -60,7 +60,8 @@ def _rate(i: int, value: float = 0.0) -> Any:
         f"Speed {i}",
         step=0.01,
         when={**having_joint(i, ROBOTS), "mode": ["posture", "velocity"]},
-        help="Velocity of the joint; m/s where it slides.",
+        units={"robot": {"scara": "m/s"}} if i == 3 else {},
+        help="Velocity of the joint, turning or sliding.",
     )
 
 

@@ -72,17 +72,33 @@ class JointParams(Params):
     controller: str = CONTROLLER.choice("pd-gravity", CONTROLLERS, "Controller", key=True)
     """The law that turns the state and the reference into torques."""
     kp: float = CONTROLLER.knob(
-        200.0, 0.0, HIGHEST_KP, "k_p", "N·m/rad", scale="log", key=True, when=CLOSED_LOOP
+        200.0,
+        0.0,
+        HIGHEST_KP,
+        "k_p",
+        "N·m/rad",
+        scale="log",
+        key=True,
+        when=CLOSED_LOOP,
+        units={"controller": {"computed-torque": "1/s²"}},
     )
-    """Torque per error. In computed torque an acceleration per error, 1/s²."""
+    """Torque per error; in computed torque an acceleration per error."""
     ki: float = CONTROLLER.knob(
         0.0, 0.0, 2000.0, "k_i", "N·m/(rad·s)", scale="log", key=True, when={"controller": "pid"}
     )
     """Torque per integrated error, PID only. At zero the integral is emptied."""
     kd: float = CONTROLLER.knob(
-        30.0, 0.0, HIGHEST_KD, "k_d", "N·m·s/rad", scale="log", key=True, when=CLOSED_LOOP
+        30.0,
+        0.0,
+        HIGHEST_KD,
+        "k_d",
+        "N·m·s/rad",
+        scale="log",
+        key=True,
+        when=CLOSED_LOOP,
+        units={"controller": {"computed-torque": "1/s"}},
     )
-    """Torque per error of velocity. In computed torque 1/s."""
+    """Torque per error of velocity; in computed torque an acceleration."""
     payload: float = WORLD.knob(0.0, 0.0, 10.0, "m_{load}", "kg", "Payload", step=0.1)
     """A point mass at the end-effector that the controller does not know of."""
     friction: float = WORLD.knob(0.0, 0.0, 20.0, "b", "N·m·s/rad", "Friction", step=0.1)

@@ -20,7 +20,7 @@ PLOTS = (
     Matrix("Who depends on whom", "dependence", r"\|\partial H / \partial q_j\|", shade=True),
     Matrix("Rotation matrix: 9 numbers", "rotation", "R_n^0"),
     Matrix("Euler angles: 3 numbers", "euler", r"(\varphi, \theta, \psi)", "rad"),
-    Matrix("Roll, pitch, yaw: 3 numbers", "rpy", r"(\text{roll}, \text{pitch}, \text{yaw})", "rad"),
+    Matrix("Roll, pitch, yaw: 3 numbers", "rpy", r"(\zeta, \vartheta, \psi)", "rad"),
     Matrix("Angle and axis: 4 numbers", "angle_axis", r"(\alpha, u)"),
     Matrix("Quaternion: 4 numbers", "quaternion", "(w, x, y, z)"),
     TimeSeries(

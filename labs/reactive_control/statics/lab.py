@@ -80,7 +80,7 @@ class Statics(Lab[StaticsParams, StaticsState]):
             "J(q)^T",
             shade=True,
         ),
-        Bars("Torque per force, along each main direction", "per_force", r"\sigma_i(J_p)", "N·m/N"),
+        Bars("Torque per force, by direction", "per_force", r"\sigma_i(J_p)", "N·m/N"),
         TimeSeries("Torques over time", "N·m", Line("tau", r"\tau"), select="joint"),
         Readout("force", "Force |f|", "N"),
         Readout("effort", "Torque |τ|", "N·m"),

@@ -103,10 +103,12 @@ function ticks(low, high, most) {
   return found;
 }
 
-// Ticks of a logarithmic axis: whole decades, or 1, 2 and 5 of each where there are few.
+// Ticks of a logarithmic axis: whole decades, or 1, 2 and 5 of each, or 1 and 3, where there are few
+// decades and the numbers do not touch.
 function decades(low, high, most) {
   const stride = Math.max(1, Math.ceil((high - low) / Math.max(1, most)));
-  const steps = high - low > 2 ? [0] : [0, Math.log10(2), Math.log10(5)];
+  const room = (fewest) => high - low <= 2 && Math.log10(fewest) * most > 0.48 * (high - low);
+  const steps = (room(2) ? [1, 2, 5] : room(3) ? [1, 3] : [1]).map(Math.log10);
   const found = [];
   for (let k = Math.floor(low / stride) * stride; k <= high; k += stride) {
     found.push(...steps.map((part) => k + part).filter((v) => v >= low && v <= high));

@@ -22,6 +22,7 @@ export class Matrix {
     const shape = JSON.stringify([names, cells.length, cells[0]?.length]);
     if (shape !== this.shape) {
       this.shape = shape;
+      this.digits = 0;
       this.table.replaceChildren(...cells.map((row, i) => {
         const made = element("tr");
         if (names) made.append(element("th", "", names[i]));
@@ -29,12 +30,25 @@ export class Matrix {
         return made;
       }));
     }
+    const texts = cells.map((row) => row.map((value) => digits(value, decimals)));
+    this.size(texts, names ?? []);
     cells.forEach((row, i) => row.forEach((value, j) => {
-      const text = digits(value, decimals);
+      const text = texts[i][j];
       const cell = this.table.rows[i].cells[j + (names ? 1 : 0)];
       if (cell.textContent !== text) cell.textContent = text;
       if (this.plot.shade) cell.style.backgroundColor = diverging((value ?? 0) / largest);
     }));
+  }
+
+  // What the style sheet needs to fit it into the card. A column never becomes narrower again while
+  // its shape stays: digits that come and go would make the whole pulsate.
+  size(texts, names) {
+    const longest = (all) => Math.max(0, ...all.map((text) => text.length));
+    this.digits = Math.max(this.digits, longest(texts.flat()));
+    const columns = texts[0].length + (names.length ? longest(names) / this.digits : 0);
+    for (const [name, value] of Object.entries({ columns, rows: texts.length, digits: this.digits })) {
+      this.table.style.setProperty(`--${name}`, value);
+    }
   }
 
   clear() {}

@@ -91,6 +91,15 @@ export class Shelf {
     this.four?.setAttribute("aria-pressed", String(this.room === 4));
     document.getElementById("plots").classList.toggle("four", shown.length > 2);
     if (this.four) this.four.hidden = this.present.length < 3;
+    for (const plot of [...shown].reverse()) reveal(this.tabs[this.plots.indexOf(plot)]);
     this.changed();
   }
+}
+
+// Scrolls the row of tabs, and nothing else, to where this one is whole.
+function reveal(tab) {
+  const row = tab.parentElement;
+  if (!row) return;
+  const [own, all] = [tab, row].map((part) => part.getBoundingClientRect());
+  row.scrollLeft += Math.min(0, own.left - all.left) + Math.max(0, Math.min(own.right - all.right, own.left - all.left));
 }

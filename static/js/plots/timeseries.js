@@ -161,14 +161,17 @@ export class TimeSeries {
     const guessed = guessedValues(this.guess, low, high);
     [low, high] = [Math.min(low, ...guessed), Math.max(high, ...guessed)];
     if (!(low <= high)) return [-1, 1];
+    // A constant is seen from zero: a hair's breadth around it would be an axis of odd digits.
+    const constant = high - low < 1e-3 * Math.max(Math.abs(low), Math.abs(high));
+    if (constant) [low, high] = [Math.min(low, 0), Math.max(high, 0)];
+    const near = constant ? 0.2 : 0.6;
     for (const curve of this.curves.filter((curve) => curve.line.style === "limit")) {
       const limit = this.board.run.latest(curve.column);
-      if (limit > 0 && high > 0.6 * limit) high = Math.max(high, limit);
-      if (limit < 0 && low < 0.6 * limit) low = Math.min(low, limit);
+      if (limit > 0 && high > near * limit) high = Math.max(high, limit);
+      if (limit < 0 && low < near * limit) low = Math.min(low, limit);
     }
-    const least = Math.max(1e-6, 1e-3 * Math.max(Math.abs(low), Math.abs(high)));
     const middle = (low + high) / 2;
-    const half = Math.max((high - low) / 2, least);
+    const half = Math.max((high - low) / 2, 1e-6);
     const wanted = [middle - 1.08 * half, middle + 1.08 * half];
     const [l, h] = this.span ?? wanted;
     const fits = l <= low && h >= high && h - l < 1.6 * (wanted[1] - wanted[0]);

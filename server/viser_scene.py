@@ -79,8 +79,8 @@ class ViserScene:
 
     # What a lab draws -----------------------------------------------------------------------
 
-    def camera(self, position: ArrayLike, look_at: ArrayLike) -> None:
-        self._cameras.look(position, look_at)
+    def camera(self, position: ArrayLike, look_at: ArrayLike, core: ArrayLike = ()) -> None:
+        self._cameras.look(position, look_at, core)
 
     def arm(
         self,

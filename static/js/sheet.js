@@ -1,6 +1,7 @@
 // On a phone the scene stays on top and the article scrolls beneath it. Knobs and plots come up as
 // sheets from the lower edge, never as high as the scene; and the current experiment's card holds
-// what it is about: the knobs it set and the plot it watches, before its answer.
+// what it is about: the knobs it set and the plot it watches, before its answer; or, while a curve is
+// sketched, that plot.
 
 // As in static/css/narrow.css; upright or on its side.
 const PHONE = matchMedia("(max-width: 47.99rem), (max-width: 74.99rem) and (max-height: 35.99rem)");
@@ -39,9 +40,10 @@ export class Sheets {
 
   // Puts knobs and plot into the current card, and back where they belong.
   arrange() {
-    const card = PHONE.matches ? document.querySelector(".experiment.current") : null;
-    const own = (selector) => (card ? [...document.querySelectorAll(selector)] : []);
-    const wanted = [...own(".knob.set"), ...own(".plot.watched")];
+    const [sketching, current] = ["sketching", "current"].map((name) => document.querySelector(`.experiment.${name}`));
+    const card = PHONE.matches ? (sketching ?? current) : null;
+    const selector = sketching ? ".plot:is(.watched, .sketched)" : ".knob.set, .plot.watched";
+    const wanted = card ? [...document.querySelectorAll(selector)] : [];
     const there = this.lent.map(([element]) => element);
     const same = wanted.length === there.length && wanted.every((element) => there.includes(element));
     if (same && (!card || card === this.card)) return;
@@ -59,6 +61,6 @@ export class Sheets {
     this.box.append(...wanted);
     const answer = card.querySelector("details");
     card.insertBefore(this.box, answer);
-    (answer ?? this.box).scrollIntoView({ block: "nearest" });
+    (this.box.querySelector(".sketched") ?? answer ?? this.box).scrollIntoView({ block: "nearest" });
   }
 }

@@ -30,7 +30,7 @@ export class Sketch {
   }
 
   buttons() {
-    const controls = element("div", "sketching");
+    const controls = element("div", "sketch-buttons");
     const button = (text, action) => {
       const made = controls.appendChild(element("button", "small", text));
       made.type = "button";

@@ -60,7 +60,7 @@ export class Sheets {
     if (turned) this.box?.remove();
     [this.card, this.sketching] = [card, sketching];
     if (!card) return;
-    const answer = card.querySelector("details");
+    const answer = card.querySelector(".verdict"); // and what to look for, beneath
     if (turned) {
       this.box = document.createElement("div");
       this.box.className = "own";
@@ -69,6 +69,6 @@ export class Sheets {
     this.box.append(...wanted);
     // Behind a sheet nothing moves.
     this.box.style.minHeight = this.open && !turned ? `${height}px` : "";
-    if (turned) (this.box.querySelector(".sketched") ?? answer).scrollIntoView({ block: "nearest" });
+    if (turned) this.box.querySelector(sketching ? ".sketched" : ".plot")?.scrollIntoView();
   }
 }

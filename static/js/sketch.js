@@ -23,7 +23,8 @@ export class Sketch {
     this.pad.addEventListener("pointerup", () => this.lift());
     this.pad.addEventListener("pointercancel", () => (this.last = null));
     this.controls = this.buttons();
-    legend.after(this.controls);
+    this.legend = legend;
+    legend.replaceWith(this.controls);
     section.classList.add("sketched");
     this.onKey = (event) => event.key === "Escape" && this.done(null);
     addEventListener("keydown", this.onKey);
@@ -47,7 +48,7 @@ export class Sketch {
   remove() {
     removeEventListener("keydown", this.onKey);
     this.pad.remove();
-    this.controls.remove();
+    this.controls.replaceWith(this.legend);
     this.section.classList.remove("sketched");
   }
 

@@ -19,8 +19,9 @@ Color = Literal["actual", "reference", "force", "warning", "muted"]
 class Scene(Protocol):
     """Where a lab draws."""
 
-    def camera(self, position: ArrayLike, look_at: ArrayLike) -> None:
-        """The view a new viewer gets, and every viewer when it changes: two (3,) points [m]."""
+    def camera(self, position: ArrayLike, look_at: ArrayLike, core: ArrayLike = ()) -> None:
+        """The view a new viewer gets, and every viewer when it changes: two (3,) points [m]. A
+        narrow window shows the `core` (..., 3) [m], if given; what is drawn around it may leave."""
         ...
 
     def arm(
@@ -121,7 +122,7 @@ class NullScene:
     def __init__(self) -> None:
         self.names: list[str] = []
 
-    def camera(self, position: ArrayLike, look_at: ArrayLike) -> None:
+    def camera(self, position: ArrayLike, look_at: ArrayLike, core: ArrayLike = ()) -> None:
         self.names.append("camera")
 
     def arm(

@@ -25,6 +25,14 @@ PREPARED = 0.12
 Clicked = Callable[[tuple[float, float, float]], None]
 
 
+def cell_corners(
+    origin: tuple[float, float, float], size: float, rows: int, columns: int
+) -> np.ndarray:
+    """The corners (rows + 1, columns + 1, 3) [m] of the cells of `Scene.cells`."""
+    outward = np.array([0.5 * size, 0.5 * size, 0.0])
+    return cell_centers(np.array(origin) - outward, size, rows + 1, columns + 1)
+
+
 class CellsNode(Node):
     """A board: one instance of a square a cell; only their colours are sent again."""
 

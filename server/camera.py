@@ -4,13 +4,13 @@ camera goes as near as it can with all that is drawn in view, until a hand takes
 import itertools
 import time
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import viser
 from numpy.typing import ArrayLike
 
-from server.framing import FOV, Window, camera_axes, extremes, nearest
+from server.framing import FOV, NARROW, Window, camera_axes, extremes, nearest
 
 ROOM = 1.0
 """What moves is followed to so many times the size of what was there when something new was drawn:
@@ -28,16 +28,28 @@ SAME = 2e-3
 """Poses that differ by less, in parts of the distance, are one."""
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) / np.sqrt(3.0)
 """(8, 3) of a ball of radius 1."""
+NOTHING = np.empty((0, 3))
 CHARACTER, LINE = 3.6, 18.0
 """[px] half the width of a character of a label, and the height of its line."""
 
 
 @dataclass(frozen=True)
 class Drawn:
-    """What a frame shows: points (k, 3) [m], and labels as a point and the text's length each."""
+    """What a frame shows: points (k, 3) [m], and labels as a point and the text's length each; and
+    what a narrow window shows of it, (n, 3) [m], none for all."""
 
     points: np.ndarray
     labels: list[tuple[np.ndarray, int]]
+    core: np.ndarray = field(default_factory=lambda: NOTHING)
+
+    def seen_by(self, window: Window) -> "Drawn":
+        """What is to be in view in a window."""
+        if not len(self.core) or window.aspect >= NARROW:
+            return self
+        low, high = self.core[:, :2].min(axis=0), self.core[:, :2].max(axis=0)
+        return Drawn(
+            self.core, [(p, n) for p, n in self.labels if ((low <= p[:2]) & (p[:2] <= high)).all()]
+        )
 
 
 class Camera:
@@ -81,6 +93,7 @@ class Camera:
         if min(camera.image_width, camera.image_height) < 2 or not len(drawn.points):
             return
         window = Window.of(camera.image_width, camera.image_height)
+        drawn = drawn.seen_by(window)
         # One that draws coarser for a while is not another window.
         resized = abs(window.aspect - self._window.aspect) > 0.02 * window.aspect
         window = self._window = window if resized else self._window
@@ -172,15 +185,18 @@ class Cameras:
         self._server = server
         self._cameras: dict[int, Camera] = {}
         self._home = np.array([[3.0, 3.0, 3.0], [0.0, 0.0, 0.0]])
+        self._core = NOTHING
         self._points: list[np.ndarray] = []
         self._solid: list[np.ndarray] = []
         self._labels: list[tuple[np.ndarray, int]] = []
-        self.solid = np.empty((0, 3))
+        self.solid = NOTHING
         """(k, 3) [m]: the solid points of the last frame."""
         server.initial_camera.fov = FOV
 
-    def look(self, position: ArrayLike, look_at: ArrayLike) -> None:
-        """From where a lab wants to be looked at: two (3,) points [m]."""
+    def look(self, position: ArrayLike, look_at: ArrayLike, core: ArrayLike = ()) -> None:
+        """From where a lab wants to be looked at: two (3,) points [m]; and what of it a narrow
+        window shows, (..., 3) [m], none for all."""
+        self._core = np.asarray(core, float).reshape(-1, 3)
         home = np.array([position, look_at], float)
         if not np.array_equal(home, self._home):
             self._home = home
@@ -210,7 +226,7 @@ class Cameras:
     def follow(self, *, changed: bool, held: bool = False) -> None:
         """Places the cameras for what was seen since the last call; not while a hand has `held` of
         something, which would slip away under it."""
-        drawn = Drawn(np.concatenate(self._points or [np.empty((0, 3))]), self._labels)
+        drawn = Drawn(np.concatenate(self._points or [NOTHING]), self._labels, self._core)
         self.solid = np.concatenate(self._solid or [self.solid[:0]])
         self._points, self._solid, self._labels = [], [], []
         now = time.monotonic()

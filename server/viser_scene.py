@@ -14,10 +14,10 @@ import viser
 from numpy.typing import ArrayLike
 
 from labs.engine.run import World
-from labs.scene import Color, cell_centers
+from labs.scene import Color
 from labs.shapes import Body
 from server import meshes
-from server.boards import CellsNode, SurfaceNode
+from server.boards import CellsNode, SurfaceNode, cell_corners
 from server.camera import CORNERS, Cameras
 from server.handles import HandleNode
 from server.labels import LabelNode, arrange_nodes
@@ -79,8 +79,8 @@ class ViserScene:
 
     # What a lab draws -----------------------------------------------------------------------
 
-    def camera(self, position: ArrayLike, look_at: ArrayLike) -> None:
-        self._cameras.look(position, look_at)
+    def camera(self, position: ArrayLike, look_at: ArrayLike, core: ArrayLike = ()) -> None:
+        self._cameras.look(position, look_at, core)
 
     def arm(
         self,
@@ -220,7 +220,7 @@ class ViserScene:
         node = self._node(name, (corner, size, colors.shape, clickable), make)
         assert isinstance(node, CellsNode)
         node.paint(colors)
-        self._cameras.see(cell_centers(corner, size, *colors.shape[:2]))
+        self._cameras.see(cell_corners(corner, size, *colors.shape[:2]))
 
     def surface(self, name: str, points: np.ndarray, colors: np.ndarray) -> None:
         def make(path: str) -> Node:

@@ -30,8 +30,8 @@ export class Experiments {
     const wanted = (this.wanted = { ...this.defaults, ...set });
     this.reached = false;
     this.before = this.latest;
-    for (const prediction of this.predictions) prediction?.putAway();
     const done = await this.apply(set, run);
+    for (const prediction of this.predictions) prediction?.putAway();
     if (this.wanted !== wanted) return; // another has begun, or the settings have moved on
     if (!done) return this.leave();
     for (const other of this.cards) other.classList.toggle("current", other === card);

@@ -70,6 +70,16 @@ export class History {
   }
 }
 
+// Every stride-th sample of [a, b), and the last.
+export function thin(samples, a, b, stride) {
+  if (stride === 1) return samples.subarray(a, b);
+  const first = a - (a % stride) + (a % stride ? stride : 0); // the same samples frame by frame
+  const kept = [];
+  for (let i = first; i < b; i += stride) kept.push(samples[i]);
+  if (b > a) kept.push(samples[b - 1]);
+  return kept;
+}
+
 // The first index with t[i] >= value, in an ascending array.
 function lower(t, value) {
   let a = 0;

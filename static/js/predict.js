@@ -14,6 +14,7 @@ export class Prediction {
     this.asked = experiment.predict;
     this.board = board;
     this.commit = commit; // starts the experiment
+    this.card = card;
     this.form = card.querySelector(".predict");
     this.verdict = card.querySelector(".verdict");
     const { guess, outcome } = storedData(this.key, {})[experiment.title] ?? {};
@@ -54,17 +55,19 @@ export class Prediction {
     this.board.setWindow(window);
     this.board.watch(watch, highlight);
     const plot = this.board.find(this.asked.plot);
-    this.pad = new Sketch(plot.body, this.asked, seconds, (curve) => {
-      this.putAway();
+    this.pad = new Sketch(plot, this.asked, seconds, (curve) => {
+      this.pad.remove();
       if (curve) this.take(curve);
+      else this.putAway();
     });
-    this.form.querySelector("button").after(this.pad.controls);
+    this.card.classList.add("sketching"); // where the plot may come to it: sheet.js
     plot.section.scrollIntoView({ block: "nearest" });
   }
 
   putAway() {
     this.pad?.remove();
     this.pad = null;
+    this.card.classList.remove("sketching");
   }
 
   take(guess) {

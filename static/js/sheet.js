@@ -1,6 +1,7 @@
 // On a phone the scene stays on top and the article scrolls beneath it. Knobs and plots come up as
 // sheets from the lower edge, never as high as the scene; and the current experiment's card holds
-// what it is about: the knobs it set and the plot it watches, before its answer.
+// what it is about: the knobs it set and the plot it watches, before its answer; or, while a curve is
+// sketched, that plot.
 
 // As in static/css/narrow.css; upright or on its side.
 const PHONE = matchMedia("(max-width: 47.99rem), (max-width: 74.99rem) and (max-height: 35.99rem)");
@@ -15,6 +16,7 @@ export class Sheets {
       if (event.key === "Escape" && this.open) this.toggle(this.open);
     });
     this.lent = []; // [element, the comment that keeps its place]
+    this.card = this.sketching = null; // the card that holds them, and whether for a sketch
     const changed = () => requestAnimationFrame(() => this.arrange());
     const watcher = new MutationObserver(changed);
     for (const card of document.querySelectorAll(".experiment")) {
@@ -35,30 +37,38 @@ export class Sheets {
     for (const button of this.buttons) {
       button.setAttribute("aria-expanded", String(button.dataset.sheet === open));
     }
+    this.arrange();
   }
 
-  // Puts knobs and plot into the current card, and back where they belong.
+  // Puts knobs and plot into the current card, and back where they belong: in a sheet, if one is up.
   arrange() {
-    const card = PHONE.matches ? document.querySelector(".experiment.current") : null;
-    const own = (selector) => (card ? [...document.querySelectorAll(selector)] : []);
-    const wanted = [...own(".knob.set"), ...own(".plot.watched")];
+    const [sketching, current] = ["sketching", "current"].map((name) => document.querySelector(`.experiment.${name}`));
+    const card = PHONE.matches ? (sketching ?? current) : null;
+    const own = (selector, sheet) => (card && this.open !== sheet ? [...document.querySelectorAll(selector)] : []);
+    const wanted = [...(sketching ? [] : own(".knob.set", "knobs")), ...own(".plot:is(.watched, .sketched)", "board")];
     const there = this.lent.map(([element]) => element);
-    const same = wanted.length === there.length && wanted.every((element) => there.includes(element));
-    if (same && (!card || card === this.card)) return;
+    const moved = wanted.length !== there.length || !wanted.every((element) => there.includes(element));
+    const turned = card !== this.card || sketching !== this.sketching;
+    if (!moved && !turned) return;
+    const height = this.box?.offsetHeight;
     for (const [element, place] of this.lent) place.replaceWith(element);
     this.lent = wanted.map((element) => {
       const place = document.createComment("");
       element.replaceWith(place);
       return [element, place];
     });
-    this.card = card;
-    this.box?.remove();
-    if (!wanted.length) return;
-    this.box = document.createElement("div");
-    this.box.className = "own";
+    if (turned) this.box?.remove();
+    [this.card, this.sketching] = [card, sketching];
+    if (!card) return;
+    const answer = card.querySelector(".verdict"); // and what to look for, beneath
+    if (turned) {
+      this.box = document.createElement("div");
+      this.box.className = "own";
+      card.insertBefore(this.box, answer);
+    }
     this.box.append(...wanted);
-    const answer = card.querySelector("details");
-    card.insertBefore(this.box, answer);
-    (answer ?? this.box).scrollIntoView({ block: "nearest" });
+    // Behind a sheet nothing moves.
+    this.box.style.minHeight = this.open && !turned ? `${height}px` : "";
+    if (turned) this.box.querySelector(sketching ? ".sketched" : ".plot")?.scrollIntoView();
   }
 }

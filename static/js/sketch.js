@@ -1,4 +1,5 @@
-// A curve drawn with the pointer on an empty plot, from left to right, in one stroke or several.
+// A curve drawn with the pointer on an empty plot, from left to right, in one stroke or several. Its
+// buttons stand in the plot's header, in place of the legend.
 
 import { element } from "./plots/card.js";
 import { Chart } from "./plots/chart.js";
@@ -8,7 +9,8 @@ const AT_THE_END = 0.97; // of the axis: lifted there, the sketch is finished
 
 export class Sketch {
   // `done` hears the curve {x [s], y}, or null once it is given up.
-  constructor(body, { range, unit }, seconds, done) {
+  constructor({ section, body, legend }, { range, unit }, seconds, done) {
+    this.section = section;
     this.range = range;
     this.unit = unit;
     this.seconds = seconds;
@@ -21,19 +23,21 @@ export class Sketch {
     this.pad.addEventListener("pointerup", () => this.lift());
     this.pad.addEventListener("pointercancel", () => (this.last = null));
     this.controls = this.buttons();
+    this.legend = legend;
+    legend.replaceWith(this.controls);
+    section.classList.add("sketched");
     this.onKey = (event) => event.key === "Escape" && this.done(null);
     addEventListener("keydown", this.onKey);
   }
 
   buttons() {
-    const controls = element("span", "sketching");
+    const controls = element("div", "sketch-buttons");
     const button = (text, action) => {
       const made = controls.appendChild(element("button", "small", text));
       made.type = "button";
       made.addEventListener("click", action);
       return made;
     };
-    controls.append(element("span", "", "Draw in the plot, to its right edge."));
     this.finish = button("Done", () => this.done(this.curve()));
     button("Again", () => this.clear());
     button("Cancel", () => this.done(null));
@@ -44,7 +48,8 @@ export class Sketch {
   remove() {
     removeEventListener("keydown", this.onKey);
     this.pad.remove();
-    this.controls.remove();
+    this.controls.replaceWith(this.legend);
+    this.section.classList.remove("sketched");
   }
 
   clear() {
@@ -93,6 +98,9 @@ export class Sketch {
   draw() {
     if (!this.pad.clientWidth) return;
     this.chart.begin([0, this.seconds], this.range, { xLabel: "t [s]", yLabel: this.unit });
+    const { left, top, width, height } = this.chart.area;
+    const empty = this.y.every((y) => y === null);
+    if (empty) this.chart.text(left + width / 2, top + 0.3 * height, "Draw here, to the right edge", "middle");
     const { x, y } = this.curve() ?? { x: [], y: [] };
     const points = x.map((t, i) => `${this.chart.x(t)},${this.chart.y(y[i])}`).join(" ");
     this.chart.add("polyline", { class: "curve guess", points });

@@ -5,7 +5,7 @@ import re
 from playwright.sync_api import Locator, Page, expect
 
 from tests.browser.conftest import screenshot
-from tests.browser.lab_page import LabPage
+from tests.browser.lab_page import LabPage, wait_frames
 
 NUMBER, CURVE, ROOT, CHOICE = 1, 2, 3, 4
 """The oscillator's experiments."""
@@ -64,6 +64,18 @@ def test_a_curve_is_sketched_on_the_empty_plot(page: Page) -> None:
     assert lab.whole(".plot.watched")
     page.keyboard.press("Escape")
     expect(pad).to_have_count(0)
+    size = page.viewport_size
+    assert size
+    page.set_viewport_size({"width": 360, "height": 640})  # a phone: the plot comes to its card
+    asked.get_by_role("button", name="Sketch").click()
+    expect(asked.locator(".sketchpad")).to_be_visible()
+    wait_frames(page)
+    assert lab.whole(".sketched")
+    assert lab.whole(".sketch-buttons button")
+    screenshot(page, "sketch-phone")
+    page.get_by_role("button", name="Cancel").click()
+    expect(asked.locator(".plot")).to_have_count(0)
+    page.set_viewport_size(size)
     asked.get_by_role("button", name="Sketch").click()
     box = pad.bounding_box()
     assert box

@@ -113,7 +113,13 @@ def test_on_a_phone_the_card_holds_its_knobs_and_its_plot(page: Page) -> None:
     assert abs(card.evaluate(top) - before) < 844, "nobody is thrown far"
     for part in ("#view", "#run", "[data-sheet=knobs]"):
         assert lab.whole(part), part
+    overflow = "own => own.scrollWidth - own.clientWidth"
+    assert own.evaluate(overflow) <= 0
+    page.get_by_role("button", name="Plots").click()  # each sheet is whole, too
+    sheet_plot = page.locator("#board").get_by_role("region", name="Cost", exact=True)
+    expect(sheet_plot).to_be_visible()
     page.get_by_role("button", name="Knobs").click()
+    expect(page.locator("#knobs .knob.set")).to_have_count(2)
     expect(lab.value("horizon")).to_be_visible()
     scene, sheet = (page.locator(part).bounding_box() for part in ("#view", "#knobs"))
     assert scene
@@ -122,6 +128,7 @@ def test_on_a_phone_the_card_holds_its_knobs_and_its_plot(page: Page) -> None:
     screenshot(page, "lqr-phone")
     page.keyboard.press("Escape")
     expect(page.locator("#knobs")).to_be_hidden()
+    expect(own.locator(".knob.set")).to_have_count(2)
     page.set_viewport_size({"width": 1366, "height": 650})  # all goes back where it belongs
     expect(page.locator("#knobs .knob.set")).to_have_count(2)
     expect(page.locator("#plots > .watched")).to_be_visible()

@@ -83,7 +83,7 @@ class CheckingScene:
     def __init__(self) -> None:
         self.drawn: set[str] = set()
 
-    def camera(self, position: ArrayLike, look_at: ArrayLike) -> None:
+    def camera(self, position: ArrayLike, look_at: ArrayLike, core: ArrayLike = ()) -> None:
         assert np.linalg.norm(_point(position) - _point(look_at)) > 0.0
 
     def arm(

@@ -187,3 +187,13 @@ def test_labels_are_in_view_too() -> None:
     camera.release()
     camera.follow(Drawn(points, [(corner, 30)]), HOME, 0.0, changed=False)
     assert viewer.pixels(corner[None])[0, 0] + half_text < 390 / 2
+
+
+def test_a_narrow_window_shows_the_core_as_large_as_it_goes() -> None:
+    core = cloud(1, 0.3)
+    drawn = Drawn(np.concatenate([core, cloud(2) + np.array([3.0, 0.0, 0.0])]), [], core)
+    for size, all_of_it in (((660, 360), True), ((390, 350), False)):
+        viewer = Viewer(*size)
+        Camera(viewer).follow(drawn, HOME, 0.0, changed=False)  # type: ignore[arg-type]
+        assert viewer.shows(core)
+        assert viewer.shows(drawn.points) == all_of_it

@@ -50,6 +50,12 @@ class Board:
         return cell_centers(self.origin, self.size, self.rows, self.columns)
 
     @cached_property
+    def around(self) -> np.ndarray:
+        """(rows + 2, columns + 2, 3) [m]: with a ring of cells more, where the wind is written."""
+        corner = np.array(self.origin) - (self.size, self.size, 0.0)
+        return cell_centers(corner, self.size, self.rows + 2, self.columns + 2)
+
+    @cached_property
     def relief(self) -> np.ndarray:
         """(rows, columns, 3) [m]: the places of the cells on the floor of the relief, beside."""
         places: np.ndarray = self.centers + np.array([self.size * self.columns + 0.25, 0.0, 0.0])
@@ -78,11 +84,11 @@ def draw_board(
 ) -> None:
     """Values V (X,), which may be NaN, coloured from 0 to `high` > 0, and a policy, (X,) controls
     or (X, U) probabilities, if any; of the states in `known` (X,) bool only, if given. With
-    `relief` the values stand behind the board as a surface, too, `high` HEIGHT tall."""
+    `relief` the values stand beside the board as a surface, too, `high` HEIGHT tall."""
     place = board(world)
     heights = _heights(world, V, high)
     relief = relief and min(world.shape) >= 2
-    scene.camera(*CAMERA)
+    scene.camera(*CAMERA, core=place.around)
     scene.cells(BOARD, place.origin, place.size, _colors(world, V, heights, goals=True))
     for x in range(len(world.cells)):
         if world.kind(x) in "SG":

@@ -253,7 +253,7 @@ export class Board {
     for (const plot of this.series) {
       if (plot.plot.select !== name) continue;
       plot.span = null;
-      plot.hidden.clear();
+      plot.switches.showAll();
       plot.rebuild();
     }
   }

@@ -2,11 +2,15 @@
 
 /* global uPlot */
 import { number } from "../format.js";
-import { card, element } from "./card.js";
+import { thin } from "../history.js";
+import { areas, drawAreas, drawGhost, ghostSamples } from "./beneath.js";
+import { card } from "./card.js";
+import { CursorBox } from "./cursor_box.js";
 import { drawGuess, guessedValues } from "./guess.js";
 import { fill } from "./labels.js";
+import { Legend } from "./legend.js";
 import { markCurves } from "./marking.js";
-import { DASHES, swatch } from "./marks.js";
+import { DASHES } from "./marks.js";
 import { colour, SERIES } from "./palette.js";
 import { extent, sentences } from "./summary.js";
 import { symbol } from "./symbol.js";
@@ -19,11 +23,10 @@ export class TimeSeries {
     this.plot = plot;
     this.board = board;
     Object.assign(this, card(plot.title));
-    this.hidden = new Set(); // lines and components switched off in the legend
+    this.switches = new Legend(this, () => this.showCurves());
+    this.box = new CursorBox(this);
     this.span = null; // the y range shown last
     this.readAt = 0;
-    this.box = element("div", "reading-box");
-    this.box.hidden = true;
     this.visible = true;
     new IntersectionObserver(([entry]) => {
       this.visible = entry.isIntersecting;
@@ -95,19 +98,21 @@ export class TimeSeries {
       ],
       series: [{}, ...this.curves.map((curve) => this.series(curve))],
       hooks: {
-        drawAxes: [(u) => this.drawAreas(u), (u) => this.drawGhost(u)],
+        drawAxes: [(u) => drawAreas(this, u), (u) => drawGhost(this, u)],
         draw: [(u) => markCurves(this, u), (u) => drawGuess(u, this.guess)],
         setSelect: [(u) => this.zoom(u)],
         setCursor: [() => this.readOut(true)],
       },
     };
     this.uplot = new uPlot(options, [[], ...this.curves.map(() => [])], this.body);
-    this.uplot.over.append(this.box);
-    this.writeLegend();
+    this.box.enter(this.uplot);
+    this.setUnit(this.unit);
+    this.switches.write();
     this.draw();
   }
 
-  series({ line, tone, l, c }) {
+  series(curve) {
+    const { line, tone } = curve;
     const dash = DASHES[line.style];
     const limit = line.style === "limit";
     const area = this.isArea(line);
@@ -118,7 +123,7 @@ export class TimeSeries {
       dash,
       auto: !limit && !area, // a far limit must not flatten the curves
       points: { show: false },
-      show: !this.hidden.has(`l${l}`) && !this.hidden.has(`c${c}`),
+      show: this.shows(curve),
     };
   }
 
@@ -146,13 +151,13 @@ export class TimeSeries {
   range(low, high, u) {
     const [from, to] = this.board.range();
     if (low === null || low === undefined) [low, high] = [Infinity, -Infinity];
-    for (const { from, to } of this.areas(u)) {
+    for (const { from, to } of areas(this, u)) {
       for (const value of [...from, ...to]) {
         if (value < low) low = value;
         if (value > high) high = value;
       }
     }
-    for (const samples of this.ghostSamples(from, to)) {
+    for (const samples of ghostSamples(this, from, to)) {
       for (const value of samples.y) {
         if (value < low) low = value;
         if (value > high) high = value;
@@ -189,70 +194,6 @@ export class TimeSeries {
     return Boolean(this.plot.stacked) && line.style === "solid";
   }
 
-  // The stacked curves shown, each with where it begins and ends at every sample: positive
-  // values upward from zero, negative ones downward.
-  *areas(u) {
-    if (!this.plot.stacked || !u.data) return;
-    const up = new Float64Array(u.data[0].length);
-    const down = new Float64Array(u.data[0].length);
-    for (const [i, curve] of this.curves.entries()) {
-      if (!this.isArea(curve.line) || !u.series[i + 1].show) continue;
-      const samples = Float64Array.from(u.data[i + 1]);
-      const from = samples.map((value, k) => (value >= 0 ? up[k] : down[k]));
-      const to = samples.map((value, k) => from[k] + value);
-      samples.forEach((value, k) => ((value >= 0 ? up : down)[k] = to[k]));
-      yield { curve, from, to };
-    }
-  }
-
-  drawAreas(u) {
-    const { ctx, bbox } = u;
-    ctx.save();
-    ctx.beginPath();
-    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
-    ctx.clip();
-    ctx.globalAlpha = 0.6;
-    for (const { curve, from, to } of this.areas(u)) {
-      const x = Array.from(u.data[0], (t) => u.valToPos(t, "x", true));
-      ctx.fillStyle = colour(curve.tone);
-      ctx.beginPath();
-      to.forEach((value, k) => ctx.lineTo(x[k], u.valToPos(value, "y", true)));
-      for (let k = x.length - 1; k >= 0; k--) ctx.lineTo(x[k], u.valToPos(from[k], "y", true));
-      ctx.fill();
-    }
-    ctx.restore();
-  }
-
-  *ghostSamples(from, to) {
-    const ghost = this.board.ghost;
-    if (!ghost) return;
-    const [a, b] = ghost.span(from, to);
-    const stride = Math.max(1, Math.floor((b - a) / 600));
-    for (const curve of this.curves) {
-      if (curve.line.style === "limit" || this.isArea(curve.line) || this.hidden.has(`l${curve.l}`) || this.hidden.has(`c${curve.c}`)) continue;
-      const y = ghost.column(curve.column);
-      if (y) yield { curve, x: thin(ghost.column("t"), a, b, stride), y: thin(y, a, b, stride) };
-    }
-  }
-
-  drawGhost(u) {
-    const { ctx, bbox } = u;
-    ctx.save();
-    ctx.beginPath();
-    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
-    ctx.clip();
-    ctx.globalAlpha = 0.32;
-    ctx.lineWidth = 1.5 * devicePixelRatio;
-    const [from, to] = this.board.range();
-    for (const { curve, x, y } of this.ghostSamples(from, to)) {
-      ctx.strokeStyle = colour(curve.tone);
-      ctx.beginPath();
-      for (let i = 0; i < x.length; i++) ctx.lineTo(u.valToPos(x[i], "x", true), u.valToPos(y[i], "y", true));
-      ctx.stroke();
-    }
-    ctx.restore();
-  }
-
   zoom(u) {
     const { left, width } = u.select;
     if (width < 4) return;
@@ -261,47 +202,15 @@ export class TimeSeries {
     this.board.zoom(from, to);
   }
 
-  // The legend: one entry a line with its value, or, of many components, lines and colours apart.
-  writeLegend() {
-    this.legend.replaceChildren();
-    this.values = [];
-    this.setUnit(this.unit);
-    const several = this.components > 1;
-    const lines = new Map(this.curves.map((curve) => [curve.l, curve]));
-    for (const [l, { line, tone, series, c }] of lines) {
-      const style = this.isArea(line) ? "area" : line.style;
-      const mark = this.marked && !several && style !== "area" ? series : 0;
-      const button = this.switch(`l${l}`, style, several && style !== "limit" ? "axis" : tone, mark);
-      button.append(symbol(line.mathml, several ? null : c));
-      if (!several) this.values.push([l, button.appendChild(element("output", "", "—"))]);
-    }
-    const { labels } = this.board;
-    for (let c = 0; several && c < this.components; c++) {
-      const series = (c % SERIES) + 1;
-      const button = this.switch(`c${c}`, "part", `series-${series}`, series);
-      button.append(labels[this.plot.select]?.[c] ?? String(c + 1));
-      if (!this.unit && this.plot.unit) button.append(element("small", "", fill(this.plot.unit, labels, c)));
-    }
+  // The curves shown are others: as the legend says.
+  showCurves() {
+    this.span = null;
+    this.curves.forEach((curve, i) => this.uplot.setSeries(i + 1, { show: this.shows(curve) }));
+    this.draw();
   }
 
-  switch(key, style, tone, series) {
-    const button = element("button", style);
-    button.type = "button";
-    button.append(swatch(style, `var(--${tone})`, series));
-    button.setAttribute("aria-pressed", String(!this.hidden.has(key)));
-    button.title = "Show or hide";
-    button.addEventListener("click", () => {
-      if (!this.hidden.delete(key)) this.hidden.add(key);
-      this.span = null;
-      button.setAttribute("aria-pressed", String(!this.hidden.has(key)));
-      this.curves.forEach((curve, i) => {
-        const show = !this.hidden.has(`l${curve.l}`) && !this.hidden.has(`c${curve.c}`);
-        this.uplot.setSeries(i + 1, { show });
-      });
-      this.draw();
-    });
-    this.legend.append(button);
-    return button;
+  shows(curve) {
+    return this.switches.shows(curve);
   }
 
   // Values at the cursor, or the latest ones.
@@ -311,30 +220,8 @@ export class TimeSeries {
     this.readAt = performance.now();
     const { idx, left } = u.cursor;
     const at = left >= 0 && idx !== null && idx !== undefined && u.data[0].length > 0 ? idx : null;
-    for (const [l, output] of this.values) {
-      const i = this.curves.findIndex((curve) => curve.l === l);
-      const samples = u.data[i + 1];
-      const text = number(samples[at ?? samples.length - 1]);
-      if (output.textContent !== text) output.textContent = text;
-    }
-    this.box.hidden = at === null;
-    if (at === null) return;
-    const rows = this.components > 1 ? this.curves.filter((_, i) => u.series[i + 1].show) : [];
-    this.box.replaceChildren(element("b", "", `t = ${u.data[0][at].toFixed(3)} s`));
-    // Only the plot one points at lists all its curves; the others tell the time alone.
-    if (u.over.matches(":hover")) {
-      for (const curve of rows.filter((curve) => curve.line.style !== "limit")) {
-        const entry = element("span");
-        entry.style.color = colour(curve.tone);
-        entry.style.gridColumn = curve.l + 1;
-        entry.append(symbol(curve.line.mathml, curve.c));
-        entry.append(element("output", "", number(u.data[this.curves.indexOf(curve) + 1][at], 3)));
-        this.box.append(entry);
-      }
-    }
-    this.box.style.gridTemplateColumns = `repeat(${rows.length ? this.plot.lines.length : 1}, auto)`;
-    const right = left > u.over.clientWidth / 2;
-    this.box.style.insetInline = right ? "0.25rem auto" : "auto 0.25rem";
+    this.switches.showValues(u, at);
+    this.box.show(u, at);
   }
 
   summary() {
@@ -354,16 +241,6 @@ export class TimeSeries {
     if (this.uplot) this.uplot.setSize({ width, height });
     else if (this.board.run) this.rebuild();
   }
-}
-
-// Every stride-th sample of [a, b), and the last.
-function thin(samples, a, b, stride) {
-  if (stride === 1) return samples.subarray(a, b);
-  const first = a - (a % stride) + (a % stride ? stride : 0); // the same samples frame by frame
-  const kept = [];
-  for (let i = first; i < b; i += stride) kept.push(samples[i]);
-  if (b > a) kept.push(samples[b - 1]);
-  return kept;
 }
 
 // What has no value is null to uPlot, which leaves a gap there.

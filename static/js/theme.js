@@ -4,3 +4,10 @@ try {
 } catch {
   // Storage may be forbidden; the page then follows the system.
 }
+
+// Mathematics makes the height of lines: an article is shown when its font is there, or late.
+const LATE = 3000; // [ms]
+const show = () => document.documentElement.classList.remove("font-awaited");
+document.documentElement.classList.add("font-awaited");
+document.fonts.load('1em "STIX Two Math"').then(show, show);
+setTimeout(show, LATE);

@@ -4,7 +4,9 @@ The whole suite runs in three processes (`pytest-xdist`); a part of it, as `pyte
 the one that was started. A server takes seconds to start: there is one for all tests that need the
 same settings."""
 
+import multiprocessing
 import os
+from concurrent.futures import ProcessPoolExecutor
 
 os.environ["ORCLAB_LABS"] = "tests.sample_labs"
 
@@ -22,12 +24,12 @@ ORDER = (
     "labs/test_contract.py",
     "browser",
     "server",
+    "test_types.py",
     "labs/test_live_sessions.py",
     "labs",
     "",
 )
-"""What begins first: the longest pieces. The contract's begins with labs that need nothing
-compiled, while a server of the first lane compiles the rest."""
+"""What begins first: the longest pieces."""
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
@@ -37,8 +39,17 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 
 def pytest_xdist_setupnodes() -> None:
-    """Forgets what is compiled and stale, before there are two who would."""
-    import labs.compiled  # noqa: F401
+    """Compiles what a fresh checkout lacks, once and on both cores, before every lane would."""
+    from labs.engine.catalog import catalog
+
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
+        list(pool.map(_prepare, reversed(catalog())))
+
+
+def _prepare(slug: str) -> None:
+    from labs.engine.catalog import find
+
+    find(slug).lab.prepare()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -66,11 +66,13 @@ export class Knobs {
 
   // The truth from the server.
   show(params) {
+    let changed = false;
     for (const [name, entry] of this.entries) {
       const value = params[name];
       const known = this.values[name];
       if (value === undefined || value === known) continue;
       this.values[name] = value;
+      changed = true;
       const own = performance.now() < entry.until;
       for (const row of entry.rows) {
         row.compare(value);
@@ -81,6 +83,7 @@ export class Knobs {
       }
       if (entry.wanted === undefined) entry.until = 0;
     }
+    if (!changed) return;
     for (const { rows } of this.entries.values()) for (const row of rows) row.showUnit();
   }
 }

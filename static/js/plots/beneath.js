@@ -20,14 +20,9 @@ export function* areas(plot, u) {
 }
 
 export function drawAreas(plot, u) {
-  const { ctx, bbox } = u;
-  ctx.save();
-  ctx.beginPath();
-  ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
-  ctx.clip();
-  ctx.globalAlpha = 0.6;
+  const ctx = clip(u, 0.6);
+  const x = Array.from(u.data[0], (t) => u.valToPos(t, "x", true));
   for (const { curve, from, to } of areas(plot, u)) {
-    const x = Array.from(u.data[0], (t) => u.valToPos(t, "x", true));
     ctx.fillStyle = colour(curve.tone);
     ctx.beginPath();
     to.forEach((value, k) => ctx.lineTo(x[k], u.valToPos(value, "y", true)));
@@ -50,12 +45,7 @@ export function* ghostSamples(plot, from, to) {
 }
 
 export function drawGhost(plot, u) {
-  const { ctx, bbox } = u;
-  ctx.save();
-  ctx.beginPath();
-  ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
-  ctx.clip();
-  ctx.globalAlpha = 0.32;
+  const ctx = clip(u, 0.32);
   ctx.lineWidth = 1.5 * devicePixelRatio;
   const [from, to] = plot.board.range();
   for (const { curve, x, y } of ghostSamples(plot, from, to)) {
@@ -65,4 +55,14 @@ export function drawGhost(plot, u) {
     ctx.stroke();
   }
   ctx.restore();
+}
+
+// The canvas, faint, and nothing beyond the plot's own area; until it is restored.
+function clip({ ctx, bbox }, alpha) {
+  ctx.save();
+  ctx.beginPath();
+  ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+  ctx.clip();
+  ctx.globalAlpha = alpha;
+  return ctx;
 }

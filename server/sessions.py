@@ -139,6 +139,10 @@ class Session:
         notice = Notice.model_validate({"state": state, "text": text})
         self._broadcast(notice.model_dump_json().encode())
 
+    def reply(self, viewer: Viewer, payload: bytes) -> None:
+        """Says something to one viewer."""
+        viewer.push(payload, list(self._latest_frames.values()))
+
     def _count(self) -> None:
         with contextlib.suppress(WorkerGone):
             if self.worker:

@@ -87,7 +87,7 @@ async def _receive(socket: WebSocket, session: Session, viewer: Viewer) -> None:
             await socket.close(TOO_LARGE, f"a message may have {limit} characters at most")
             return
         answer = await _answer(session, text)
-        viewer.push(answer.model_dump_json().encode(), [])
+        session.reply(viewer, answer.model_dump_json().encode())
 
 
 async def _answer(session: Session, text: str) -> Answer:

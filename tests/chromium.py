@@ -14,5 +14,7 @@ ARGUMENTS = [
 
 
 def find() -> str | None:
-    """The path of the browser; None where there is none."""
-    return shutil.which("chromium") or shutil.which("chromium-browser")
+    """The path of the browser; None where there is none. The one without a window of its own, where
+    it is installed, is half the work to start."""
+    names = ("chromium-headless-shell", "chromium", "chromium-browser")
+    return next(filter(None, map(shutil.which, names)), None)

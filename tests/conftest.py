@@ -66,6 +66,8 @@ class Lanes(LoadScopeScheduling):  # type: ignore[misc]
     def _split_scope(self, nodeid: str) -> str:
         path = nodeid.partition("::")[0].removeprefix("tests/")
         folder = path.partition("/")[0]
+        if path == "browser/test_comeback.py":
+            return "server"  # it ends the servers that those tests end, too
         alone = folder == "labs" or path == "browser/test_every_lab.py"
         return path if alone else folder
 

@@ -22,7 +22,7 @@ import { noteVisit } from "./visits.js";
 const lab = JSON.parse(document.getElementById("lab-data").textContent);
 const session = new Session(lab, document.getElementById("robot"), readLink(), view);
 const stage = new Stage();
-const board = new Board(lab);
+const board = new Board(lab, () => session.fresh);
 const transport = new Transport(send);
 const solver = new SolverRow(send, loadSolution);
 const knobs = new Knobs(lab, (changes) => session.change(changes));

@@ -25,6 +25,7 @@ export class Session extends EventTarget {
     this.answers = new Map(); // what waits for the server's answer, by its reference
     this.refs = 0;
     this.changed = 0; // [ms] when changes were sent last
+    this.fresh = true; // whether the telemetry since then shows them
     this.frame.addEventListener("load", () => {
       this.sceneLoaded = this.info !== null;
       this.goLive();
@@ -102,6 +103,7 @@ export class Session extends EventTarget {
       if (message.type === "status") this.noteStatus(message);
       if (message.type === "hello") this.noteWorker(message.worker);
       if (message.type === "answer") this.answers.get(message.ref)?.(message.error);
+      if (message.type === "telemetry" && this.answers.size === 0) this.fresh = true;
       this.emit(message.type, message);
       if (message.type === "notice" && message.state === "ended") this.noteEnded(message.text);
     };
@@ -235,6 +237,7 @@ export class Session extends EventTarget {
 
   sendChanges(changes) {
     this.changed = performance.now();
+    this.fresh = false;
     return this.ask({ type: "params", changes });
   }
 

@@ -12,6 +12,12 @@ from tests import chromium as chromium_browser
 from tests.served import PATIENCE, Served
 
 SCREENSHOTS = Path("screenshots")
+SLOW_SCENES = """if (location.pathname.startsWith("/scene/")) {
+  const next = requestAnimationFrame;
+  window.requestAnimationFrame = (draw) => setTimeout(() => next(draw), 60);
+  window.cancelAnimationFrame = clearTimeout;
+}"""
+"""Some 13 frames a second: drawn in software at full speed, a scene takes a core and more."""
 Visit = Callable[..., BrowserContext]
 
 
@@ -45,6 +51,7 @@ def visit(chromium: Browser) -> Iterator[Visit]:
         options = {"viewport": {"width": 1280, "height": 800}} | options
         context = chromium.new_context(base_url=server.address, **options)
         context.set_default_timeout(1000 * PATIENCE)
+        context.add_init_script(SLOW_SCENES)
         context.on("weberror", lambda error: errors.append(str(error.error)))
         opened.append(context)
         return context

@@ -16,11 +16,15 @@ import { summarise } from "./summary.js";
 import { TimeSeries } from "./timeseries.js";
 
 const WORDS_EVERY = 2000; // [ms]
+const LONGEST_WAIT = 50; // [ms] for what a change has done
 const KINDS = { TimeSeries, Curves, Bars, Matrix, HeatMap, Note };
 
 export class Board {
-  constructor(lab) {
+  // `isFresh` tells whether what was received shows the last change already.
+  constructor(lab, isFresh) {
     this.lab = lab;
+    this.isFresh = isFresh;
+    this.drawn = 0; // [ms] when the plots were drawn last
     this.run = this.ghost = null;
     this.number = null; // counts restarts, as the server does
     this.window = 10;
@@ -153,8 +157,11 @@ export class Board {
   refresh() {
     if (this.unzoomButton) this.unzoomButton.hidden = !this.zoomed;
     if (this.pending || !this.run) return;
-    this.pending = requestAnimationFrame(() => {
+    this.pending = requestAnimationFrame((now) => {
       this.pending = 0;
+      // Drawing would hold up the very news it should show: it waits for them.
+      if (!this.isFresh() && now - this.drawn < LONGEST_WAIT) return this.refresh();
+      this.drawn = now;
       for (const plot of this.series) plot.draw();
       this.readouts.update(this.run, this.now);
     });

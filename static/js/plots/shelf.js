@@ -47,6 +47,7 @@ export class Shelf {
 
   // The plots that mean something under the present parameters.
   choose(plots) {
+    if (plots.length === this.present.length && plots.every((plot) => this.present.includes(plot))) return;
     this.present = plots;
     this.show();
   }

@@ -30,6 +30,7 @@ export class Experiments {
     const wanted = (this.wanted = { ...this.defaults, ...set });
     this.reached = false;
     this.before = this.latest;
+    this.predictions[i]?.takePending();
     const done = await this.apply(set, run);
     for (const prediction of this.predictions) prediction?.putAway();
     if (this.wanted !== wanted) return; // another has begun, or the settings have moved on

@@ -37,16 +37,30 @@ export class Prediction {
   }
 
   readNumber() {
+    const value = this.typed();
+    if (value === null) this.form.querySelector("input").focus();
+    else this.take(value);
+  }
+
+  // The number that is typed; null, and marked, if it is none.
+  typed() {
     const field = this.form.querySelector("input");
     const text = field.value.trim().replace("−", "-").replace(/^(-?\d*),(\d+)$/, "$1.$2");
     const wrong = this.form.querySelector(".wrong");
-    const value = Number(text);
-    const valid = text !== "" && Number.isFinite(value);
+    const valid = text !== "" && Number.isFinite(Number(text));
     wrong.textContent = valid ? "" : "Type a number, such as 2.5 or 1e-3.";
     wrong.hidden = valid;
     field.setAttribute("aria-invalid", String(!valid));
-    if (valid) this.take(value);
-    else field.focus();
+    return valid ? Number(text) : null;
+  }
+
+  // The experiment's button is pressed: what stands there counts as the guess.
+  takePending() {
+    const { kind } = this.asked;
+    if (kind === "curve") this.guess = this.pad?.curve() ?? this.guess;
+    else if (kind === "number" && this.form.querySelector("input").value.trim()) this.guess = this.typed() ?? this.guess;
+    else return;
+    if (this.guess !== null) this.save();
   }
 
   sketch() {

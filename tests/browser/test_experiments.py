@@ -53,6 +53,9 @@ def test_a_number_is_guessed_held_compared_and_remembered(page: Page) -> None:
     asked.locator(".try").click()  # without another guess: the old one is tried again
     expect(verdict).to_contain_text("The outcome comes at t = 1 s.")
     expect(verdict).to_contain_text("Outcome: −0.416 m")
+    field.fill("-0,4")
+    asked.locator(".try").click()  # what is typed counts
+    expect(verdict).to_contain_text("Your guess: −0.400 m. Outcome: −0.416 m")
 
 
 def test_a_curve_is_sketched_on_the_empty_plot(page: Page) -> None:
@@ -87,6 +90,13 @@ def test_a_curve_is_sketched_on_the_empty_plot(page: Page) -> None:
     page.mouse.up()
     expect(pad.locator(".guess")).to_have_attribute("points", re.compile(r"\d"))
     expect(page.locator(".experiment.current")).to_have_count(0)
+    asked.locator(".try").click()  # half of it drawn: that half counts
+    expect(asked.get_by_role("status")).to_contain_text("Your curve is off by")
+    asked.get_by_role("button", name="Sketch").click()
+    page.mouse.move(box["x"] + 30, zero["y"])
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.6 * box["width"], zero["y"])
+    page.mouse.up()
     page.mouse.move(box["x"] + 0.6 * box["width"], zero["y"])
     page.mouse.down()
     page.mouse.move(box["x"] + box["width"] + 30, zero["y"], steps=3)

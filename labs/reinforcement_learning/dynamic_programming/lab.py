@@ -49,6 +49,7 @@ from labs.tasks.grid_world.params import edit_map
 from labs.tasks.grid_world.picture import draw_board, draw_walkers, draw_way
 from labs.tasks.grid_world.walk import GridWalk, nominal_path
 from labs.tasks.pendulum_table.picture import draw_table
+from labs.tasks.pendulum_table.swing import Swing
 from labs.tasks.pendulum_table.table import table_size
 
 
@@ -162,7 +163,11 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
     def accept(
         self, params: DynamicProgrammingParams, state: DynamicProgrammingState, snapshot: Snapshot
     ) -> DynamicProgrammingState:
-        follower = carry_over(tabular_task(snapshot.data["task"]), state.follower)
+        """A pendulum that half-made policies have pushed about starts anew with the full table."""
+        task, iterates = tabular_task(snapshot.data["task"]), snapshot.data["iterates"]
+        follower = carry_over(task, state.follower)
+        if isinstance(follower.walk, Swing) and iterates.over and not state.iterates.over:
+            follower = start_follower(task, follower.draws)
         return replace(state, **snapshot.data, follower=follower)
 
     def edit(

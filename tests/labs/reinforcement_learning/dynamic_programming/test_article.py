@@ -151,6 +151,16 @@ def test_a_coarse_table_does_not_see_that_it_hangs(setting: Setting) -> None:
     assert (world.recording().channels["torque"] == 0.0).all()
     world.press("push")
     assert angles(world, 6.0).min() < 0.2
+    # Live, what half-made policies do while the table fills is over once it is full.
+    world = World(find(SLUG), setting)
+    for _ in range(5):
+        world.iterate()
+        world.advance()
+    while world.solving:
+        world.press("push")
+        world.advance()
+        world.iterate()
+    assert angles(world, 4.0)[-300:].min() > 3.14
 
     def broken(nodes: float) -> float:
         """By how much more the first 8 s cost than promised."""

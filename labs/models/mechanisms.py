@@ -8,7 +8,7 @@ S (nv, nu) picks the driven joints. M and h include a payload, a point mass at t
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -17,6 +17,7 @@ from labs.algorithms.integrators import Acceleration
 from labs.errors import LabError
 from labs.models.arms import Arm, load
 from labs.models.cart_pole import cart_pole
+from labs.models.mass_on_a_line import mass_on_a_line
 from labs.models.pendulums import hanging
 from labs.models.plant import Force, Plant, laden
 
@@ -45,7 +46,7 @@ class Mechanism:
         """A workspace: its contents mean nothing between calls."""
         return self.plant.data
 
-    @property
+    @cached_property
     def nq(self) -> int:
         return int(self.model.nq)
 
@@ -57,7 +58,7 @@ class Mechanism:
     def nu(self) -> int:
         return len(self.driven)
 
-    @property
+    @cached_property
     def S(self) -> np.ndarray:
         """(nv, nu) from controls to joint torques."""
         return np.eye(self.nq)[:, list(self.driven)]
@@ -80,8 +81,13 @@ class Mechanism:
 
     def f(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         """x' (nx,)."""
-        q, v = x[: self.nq], x[self.nq :]
-        return np.concatenate([v, self.acceleration(u)(q, v)])
+        n, rate = self.nq, np.empty_like(x)
+        v = x[n:]
+        torque = u if len(u) == n else self.S @ u
+        if self.friction > 0.0:
+            torque = torque - self.friction * v
+        rate[:n], rate[n:] = v, pin.aba(self.model, self.data, x[:n], v, torque)
+        return rate
 
     def derivatives(
         self, X: np.ndarray, U: np.ndarray
@@ -141,6 +147,7 @@ MECHANISMS: Mapping[str, tuple[Callable[[], Arm], tuple[int, ...]]] = {
     "pendubot": (lambda: hanging(2), (0,)),
     "cart-pole": (cart_pole, (0,)),
     "ur5": (lambda: load("ur5"), tuple(range(6))),
+    "mass": (mass_on_a_line, (0,)),
 }
 """By name: what moves, and which joints are driven. The acrobot is the double pendulum driven
 at its elbow alone, the pendubot at its shoulder alone."""

@@ -7,6 +7,7 @@ import platform
 
 from tests.benchmarks import (
     ddp,
+    direct,
     dynamic_programming,
     frames,
     headless,
@@ -23,6 +24,8 @@ MEASURES = {
     "lqr": lqr.riccati,
     "ddp": ddp.iteration_ratio,
     "ddp-growth": ddp.growth,
+    "direct": direct.beside_ipopt,
+    "direct-iteration": direct.on_the_ur5,
     "value-iteration": dynamic_programming.on_the_pendulum,
     "q-learning": td_control.q_learning_steps,
     "slider": latency.slider_to_telemetry,

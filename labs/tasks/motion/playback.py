@@ -1,5 +1,5 @@
 """A plan played on the real plant, open loop beside feedback (notes, 2.4.6): DDP's, and those of
-shooting and collocation to come.
+collocation and multiple shooting.
 
 From x_0, at every tick k of the plan (each h seconds), the two runs set
 

@@ -1,0 +1,140 @@
+"""Sequential quadratic programming, Newton's method for a nonlinear programme (notes, 2.3.1),
+
+    minimise f(y)   subject to   c(y) = 0,   g(y) <= 0,   lower <= y <= upper
+
+One iteration expands f, c and g about y and solves the quadratic programme
+
+    minimise  f_y' p + p' P p / 2   subject to   c + c_y p = 0,   g + g_y p <= 0,   y + p in bounds
+
+whose multipliers lam, mu, nu are those of the next iterate, and searches along p (`sqp_step`). P
+is the Hessian of the Lagrangian L = f + lam' c + mu' g + nu' y, made convex (`sqp_convexity`);
+Gauss-Newton's, which knows f alone; or learnt (`sqp_bfgs`). It has converged where
+
+    |f_y + c_y' lam + g_y' mu + nu| and mu' g vanish,   c = 0,   g <= 0
+
+within a tolerance, in parts of what these sums are made of (`sqp_optimality`). It is infeasible
+where c = 0, g <= 0 are not met and no step comes closer to meeting them, linearised.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from labs.algorithms import sqp_bfgs
+from labs.algorithms.sqp_filter import LARGEST_GROWTH, Filter, violation
+from labs.algorithms.sqp_iterate import Iterate as Iterate
+from labs.algorithms.sqp_iterate import Options as Options
+from labs.algorithms.sqp_optimality import optimality, worst_violation
+from labs.algorithms.sqp_step import moved
+from labs.errors import LabError
+from labs.problems.nonlinear_program import NonlinearProgram
+from labs.resumable import Resumable, run_to_completion, timed
+
+STALLED = 1e-13
+"""A whole step that changes y by less than this, in its units or parts of it, is none."""
+
+
+def init(program: NonlinearProgram, y: np.ndarray, options: Options) -> Iterate:
+    """The first guess y (n,), cut to the bounds. Raises LabError if it does not fit."""
+    n = len(program.lower)
+    if y.shape != (n,):
+        raise LabError(f"the first guess has shape {y.shape}; the programme takes ({n},)")
+    empty = np.flatnonzero(program.lower > program.upper)
+    y = np.minimum(np.maximum(np.array(y, dtype=float), program.lower), program.upper)
+    values = program.values(y)
+    stopped = ""
+    if empty.size:
+        name = program.variable_name(int(empty[0]))
+        stopped = f"Infeasible: the lower bound of {name} is above its upper one."
+    elif not np.isfinite(values.f):
+        stopped = "Failed: the first guess diverges. Start from another."
+    largest = LARGEST_GROWTH * max(1.0, violation(values))
+    multipliers = (np.zeros(len(values.c)), np.zeros(len(values.g)), np.zeros(n))
+    infeasible = bool(empty.size)
+    return Iterate(y, values, *multipliers, Filter(largest), stopped=stopped, infeasible=infeasible)
+
+
+def step(program: NonlinearProgram, options: Options, at: Iterate) -> Iterate:
+    """One iteration. What has stopped stays as it is."""
+    return run_to_completion(step_in_pieces(program, options, at))
+
+
+def step_in_pieces(program: NonlinearProgram, options: Options, at: Iterate) -> Resumable[Iterate]:
+    """The same, pausing between pieces of some milliseconds."""
+    if at.stopped:
+        return at
+    seconds = {"derivatives": 0.0, "QP": 0.0, "line search": 0.0}
+    if at.derivatives is None:
+        at = yield from timed(_expanded(program, options, at), seconds, "derivatives")
+        if at.stopped:
+            return replace(at, seconds=seconds)
+    before = at
+    at = yield from moved(program, options, at, seconds)
+    at = replace(at, iteration=at.iteration + 1)
+    if not at.stopped:
+        at = yield from timed(_expanded(program, options, at), seconds, "derivatives")
+    if at.learnt and at.derivatives and before.derivatives:
+        change = at.gradient(at.derivatives) - at.gradient(before.derivatives)
+        at = replace(at, learnt=at.learnt.updated(at.y - before.y, change))
+    if not at.stopped:
+        at = replace(at, stopped=_stop_short(program, options, before, at))
+    return replace(at, seconds=seconds)
+
+
+def solve(program: NonlinearProgram, y: np.ndarray, options: Options | None = None) -> Iterate:
+    """Iterates from the first guess y (n,) until it stops."""
+    options = options or Options()
+    at = init(program, y, options)
+    while not at.stopped:
+        at = step(program, options, at)
+    return at
+
+
+def restart(program: NonlinearProgram, at: Iterate, options: Options) -> Iterate:
+    """From where another programme's iterate ended, with its multipliers where they fit: for a
+    problem that is a little different."""
+    new = init(program, at.y, options)
+    if len(new.lam) != len(at.lam) or len(new.mu) != len(at.mu):
+        return new
+    return replace(new, lam=at.lam, mu=at.mu, nu=at.nu, learnt=None)
+
+
+def _expanded(program: NonlinearProgram, options: Options, at: Iterate) -> Resumable[Iterate]:
+    """With derivatives at y, the first Hessian that BFGS learns from, and whether it has
+    converged there."""
+    d = program.derivatives(at.y)
+    yield
+    if not all(np.isfinite(part).all() for part in (d.f_y, d.c_y.data, d.g_y.data)):
+        return replace(at, stopped="Failed: the derivatives are not finite. Start from elsewhere.")
+    largest = max(at.largest_gradient, float(np.abs(d.f_y).max(initial=0.0)))
+    found = optimality(program, at.y, at.values, d, at.lam, at.mu, largest)
+    at = replace(at, derivatives=d, optimality=found, nu=found.nu, largest_gradient=largest)
+    if max(found.residual, found.violation) <= options.tolerance:
+        return replace(at, converged=True, stopped=_convergence_message(at))
+    if options.hessian == "bfgs" and at.learnt is None:
+        f_yy = yield from program.hessian(at.y, at.lam, at.mu, exact=False)
+        at = replace(at, learnt=sqp_bfgs.first(f_yy))
+    return at
+
+
+def _stop_short(program: NonlinearProgram, options: Options, before: Iterate, at: Iterate) -> str:
+    """Why to stop here without convergence, if there is a reason."""
+    assert at.optimality
+    where = f"KKT residual {at.optimality.residual:.1e}; {worst_violation(program, at.values)}"
+    change = float((np.abs(at.y - before.y) / (1.0 + np.abs(at.y))).max(initial=0.0))
+    if at.alpha == 1.0 and change < STALLED and not at.penalty:
+        return f"Stopped short: steps have become too small to be told from rounding, {where}."
+    if at.iteration >= options.iterations:
+        return (
+            f"Stopped short after {at.iteration} iterations: {where}. Solve again from here to "
+            "go on."
+        )
+    return ""
+
+
+def _convergence_message(at: Iterate) -> str:
+    assert at.optimality
+    return (
+        f"Converged after {at.iteration} iteration{'s'[: at.iteration != 1]}: KKT residual "
+        f"{at.optimality.residual:.1e}, constraints met to {at.violation:.1e}."
+    )

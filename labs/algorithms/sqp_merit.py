@@ -1,0 +1,52 @@
+"""How long a step of the elastic mode may be (beyond the notes): the first of alpha = 1, 1/2, ...
+that lowers phi = f + gamma theta by a part of what the step's model promises."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from labs.algorithms.sqp_filter import (
+    ARMIJO,
+    HALVINGS,
+    ROUNDING,
+    Filter,
+    Search,
+    Trial,
+    violation,
+)
+from labs.problems.nonlinear_program import NonlinearProgram, Values
+from labs.resumable import Resumable
+
+
+def descend(
+    program: NonlinearProgram,
+    y: np.ndarray,
+    values: Values,
+    p: np.ndarray,
+    slope: float,
+    gamma: float,
+    filter_: Filter,
+    corrected: Callable[[np.ndarray, Values], np.ndarray | None],
+) -> Resumable[Search]:
+    """Along p from y, phi falling by `slope`; the filter is forgotten, but for its largest theta.
+    `corrected` as in `sqp_filter.search`."""
+    phi = values.f + gamma * violation(values)
+    rounding = ROUNDING * abs(phi)
+    fresh, valued = Filter(filter_.largest), False
+    for k in range(HALVINGS + 1):
+        alpha = 0.5**k
+        ends = [y + alpha * p]
+        new = program.values(ends[0])
+        yield
+        if not np.isfinite(new.f):
+            continue
+        valued = True
+        if new.f + gamma * violation(new) - phi <= ARMIJO * alpha * slope + rounding:
+            return Search(Trial(ends[0], new, alpha, fresh))
+        better = corrected(p, new) if k == 0 else None
+        if better is not None:
+            new = program.values(y + better)
+            yield
+            if new.f + gamma * violation(new) - phi <= ARMIJO * slope + rounding:
+                return Search(Trial(y + better, new, 1.0, fresh, True))
+    return Search(None, not valued)

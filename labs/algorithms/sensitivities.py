@@ -47,15 +47,15 @@ def semi_implicit_euler(f: Derivatives, X: np.ndarray, U: np.ndarray, h: float) 
 
 def midpoint(f: Derivatives, X: np.ndarray, U: np.ndarray, h: float) -> Sensitivities:
     """x+ = x + h f(x + h/2 f(x, u), u)."""
-    _, second = _stages(f, X, U, (0.5 * h, h))
+    _, second = stages(f, X, U, (0.5 * h,))
     return X + h * second[0], _plus_identity(h * second[1]), h * second[2]
 
 
 def rk4(f: Derivatives, X: np.ndarray, U: np.ndarray, h: float) -> Sensitivities:
     """The classical Runge-Kutta method."""
-    stages = _stages(f, X, U, (0.5 * h, 0.5 * h, h, h))
+    found = stages(f, X, U, (0.5 * h, 0.5 * h, h))
     k, k_x, k_u = (
-        h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4) for k1, k2, k3, k4 in zip(*stages, strict=True)
+        h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4) for k1, k2, k3, k4 in zip(*found, strict=True)
     )
     return X + k, _plus_identity(k_x), k_u
 
@@ -71,12 +71,12 @@ SENSITIVITIES: Mapping[
 """By the names of `labs.algorithms.integrators.INTEGRATORS`."""
 
 
-def _stages(
+def stages(
     f: Derivatives, X: np.ndarray, U: np.ndarray, shifts: tuple[float, ...]
 ) -> list[Sensitivities]:
-    """k_i, dk_i/dx, dk_i/du, where stage i + 1 is at x + shifts[i] k_i."""
+    """k_i, dk_i/dx, dk_i/du of all stages: the first is at x, stage i + 1 at x + shifts[i] k_i."""
     found = [f(X, U)]
-    for shift in shifts[:-1]:
+    for shift in shifts:
         k, k_x, k_u = found[-1]
         slope, f_x, f_u = f(X + shift * k, U)
         found.append((slope, f_x + shift * f_x @ k_x, f_u + shift * f_x @ k_u))

@@ -329,10 +329,15 @@ def plain(value: Any) -> Any:
     return repr(value)
 
 
-def begun(entry: Entry, changes: Mapping[str, Value] | None = None, steps: int = 3) -> World:
+def begun(
+    entry: Entry,
+    changes: Mapping[str, Value] | None = None,
+    steps: int = 3,
+    iterations: int = LOOKED_AT,
+) -> World:
     """A world after a few iterations of its solver and a few steps."""
     world = World(entry, changes, seed=1)
-    iterate(world, LOOKED_AT)
+    iterate(world, iterations)
     advance(world, steps)
     return world
 

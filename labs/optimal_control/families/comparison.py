@@ -1,0 +1,34 @@
+"""What ties the four families together, in numbers: along the optimal motion the costate, the
+gradient of V and the direct method's multipliers are one curve, and each tail is optimal."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from labs.optimal_control.families.motion import Motion
+from labs.optimal_control.families.params import FamiliesParams
+
+TINY = 1e-12
+
+
+def gap(curves: np.ndarray, others: np.ndarray, size: np.ndarray | None = None) -> float:
+    """The largest distance of two (k, 2), each column in parts of its largest value [%]."""
+    size = np.abs(others).max(axis=0) if size is None else size
+    return float(100.0 * (np.abs(curves - others).max(axis=0) / np.maximum(size, TINY)).max())
+
+
+def tail_gaps(params: FamiliesParams, optimal: Motion, tail: Motion) -> Mapping[str, float]:
+    """By how much a tail misses the optimal motion, and its cost what was left of J [%]."""
+    rest = np.stack([np.interp(tail.t, optimal.t, column) for column in optimal.X.T], axis=1)
+    left = optimal.cost - paid_until(params, optimal, float(tail.t[0]))
+    return {
+        "tail_gap": gap(tail.X, rest, np.abs(optimal.X).max(axis=0)),
+        "tail_cost_gap": 100.0 * abs(tail.cost - left) / max(optimal.cost, TINY),
+    }
+
+
+def paid_until(params: FamiliesParams, motion: Motion, t: float) -> float:
+    """int l dt from 0 to t [s], by cubics through the samples of l."""
+    rate = params.cost.running(motion.X, motion.U[:, None])
+    return float(CubicSpline(motion.t, rate).integrate(0.0, t))

@@ -1,0 +1,82 @@
+"""What becomes of a plan when one of its controls is changed: in truth, and as its sensitivities
+have it. It is looked at, never taken."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from labs.algorithms.single_shooting import SingleShooting
+from labs.arrays import with_row
+from labs.optimal_control.single_shooting.plan import Plan, held_where_diverged
+from labs.optimal_control.single_shooting.systems import system
+
+FAN = (-1.0, -2 / 3, -1 / 3, 1 / 3, 2 / 3, 1.0)
+"""The changes that are shown, in parts of the chosen one, which is the last."""
+RANGE = 2.0
+"""[u_0] over which the end of the motion is asked for, either way."""
+STEPS, LEAST_ENDS, MOST_ENDS = 600, 9, 31
+"""Steps of integration that this may take, about, and how many changes are tried."""
+
+
+@dataclass(frozen=True, eq=False)
+class Changed:
+    """The motion with another u_k of the first motor."""
+
+    fan: np.ndarray
+    """(len(FAN), N M + 1, nx)"""
+    forecast: np.ndarray
+    """(N M + 1, nx): x + dx/dy_k delta, of the chosen change."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """Where the motion ends, for changes of many sizes."""
+
+    changes: np.ndarray
+    """(n,) [u_0]"""
+    truth: np.ndarray
+    """(n, nx)"""
+    forecast: np.ndarray
+    """(n, nx) along dx(T)/dy_k"""
+
+
+@lru_cache(maxsize=4)
+def changed_motions(name: str, plan: Plan, k: int, change: float) -> Changed:
+    """When u_k of the system of this name becomes u_k + change u_0."""
+    fan = np.array([_with_change(name, plan, k, part * change) for part in FAN])
+    return Changed(fan, plan.X + change * _sensitivity(name, plan, k))
+
+
+@lru_cache(maxsize=4)
+def changed_ends(name: str, plan: Plan, k: int) -> Ends:
+    """Over changes of u_k within RANGE."""
+    steps = (plan.N - k) * plan.M
+    count = int(np.clip(STEPS // steps, LEAST_ENDS, MOST_ENDS)) | 1  # odd: none is among them
+    changes = np.linspace(-RANGE, RANGE, count)
+    truth = np.array([_with_change(name, plan, k, change)[-1] for change in changes])
+    slope = _sensitivity(name, plan, k)[-1]
+    return Ends(changes, truth, plan.X[-1] + changes[:, None] * slope)
+
+
+def _with_change(name: str, plan: Plan, k: int, change: float) -> np.ndarray:
+    """X (N M + 1, nx) with u_k + change u_0 of the first motor."""
+    u_0 = system(name).u_0
+    U = with_row(plan.U[k:], 0, plan.U[k] + change * np.eye(1, len(u_0))[0] * u_0)
+    tail = _tail(name, plan, k)
+    X = tail.rollout(tail.pack(U)).X
+    return np.concatenate([plan.X[: k * plan.M], held_where_diverged(X)])
+
+
+def _sensitivity(name: str, plan: Plan, k: int) -> np.ndarray:
+    """dx_j/d(u_k/u_0) (N M + 1, nx) of the first motor: none before t_k."""
+    tail = _tail(name, plan, k)
+    S = tail.sensitivities(tail.linearize(tail.pack(plan.U[k:])))[:, :, 0]
+    return np.concatenate([np.zeros((k * plan.M, tail.nx)), S * system(name).u_0[0]])
+
+
+def _tail(name: str, plan: Plan, k: int) -> SingleShooting:
+    """From piece k to the end."""
+    T = plan.T * (1.0 - k / plan.N)
+    x = plan.X[k * plan.M]
+    return system(name).shooting(x, plan.N - k, T, plan.M, plan.integrator)

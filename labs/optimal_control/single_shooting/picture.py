@@ -1,0 +1,111 @@
+"""The motion in its scene. Time runs away from the viewer: the path of a tip is drawn as it would
+be if the world moved back at SPEED, so that motions along one circle part."""
+
+from functools import lru_cache
+
+import numpy as np
+
+from labs.optimal_control.single_shooting.changes import changed_motions
+from labs.optimal_control.single_shooting.history import KEPT
+from labs.optimal_control.single_shooting.params import SingleShootingParams
+from labs.optimal_control.single_shooting.plan import Plan, state_at
+from labs.optimal_control.single_shooting.systems import System, system
+from labs.params import Value
+from labs.scene import Scene
+
+SPEED = 0.2
+"""[m/s] along -x."""
+POINTS = 80
+"""Of a path."""
+WIDTH, HEIGHT = 0.8, 0.12
+"""[m] of the strip of the control's change: of the whole time, and of u_0."""
+SAME = 0.01
+"""[m] Paths that differ by no more lie on one another."""
+BALL = 0.03
+"""[m] radius of the ball that changes a control."""
+APART = 0.1
+"""[m] between the tips from which on the ghost says what it is."""
+
+
+def draw_robots(scene: Scene, params: SingleShootingParams, plan: Plan, t: float) -> None:
+    """The robot as the simulation has it at t [s], and as the ghost where the changed control
+    would have it; without a change, where the plan has it."""
+    at = params.task
+    arm, n = at.mechanism.arm, at.mechanism.nq
+    scene.camera(*at.camera)
+    x = state_at(plan.played(params.feedback)[0], plan.T, t)
+    piece = _piece(params, plan)
+    changed = changed_motions(params.system, plan, piece, params.delta).fan[-1]
+    ghost = state_at(changed, plan.T, t)
+    scene.arm("robot", arm, x[:n])
+    scene.arm("ghost", arm, ghost[:n], ghost=True)
+    tips = [at.mechanism.tip(state[:n]) for state in (x, ghost)]
+    if np.linalg.norm(tips[0] - tips[1]) > APART:
+        word = "planned" if params.delta == 0.0 else "changed"
+        scene.label("of ghost", word, tips[1])
+
+
+def draw_paths(
+    scene: Scene,
+    params: SingleShootingParams,
+    plan: Plan,
+    paths: np.ndarray,
+    t: float,
+    failed: bool,
+) -> None:
+    """The plan's path, the last of `paths`, and where along it t [s] is; fading behind it those of
+    the iterations before, or the fan of what a changed control makes of it."""
+    scene.trail("plan", paths[-1], "warning" if failed else "reference")
+    place = params.task.mechanism.tip(state_at(plan.X, plan.T, t)[: params.task.mechanism.nq])
+    scene.sphere("now", place - np.array([SPEED * t, 0.0, 0.0]), 0.02, "reference")
+    if params.delta == 0.0:
+        for i in range(KEPT - 1):
+            if np.abs(paths[i] - paths[i + 1]).max() > SAME:
+                scene.trail(f"before {KEPT - 1 - i}", paths[i], "muted", (i + 1) / KEPT)
+        return
+    *fan, chosen = _fan_lines(params.system, plan, _piece(params, plan), params.delta)
+    for i, line in enumerate(fan, 1):
+        scene.trail(f"fan {i}", line, "force", 0.3)
+    scene.trail("changed", chosen, "force")
+
+
+def draw_change(scene: Scene, params: SingleShootingParams) -> None:
+    """The change of the control over time, as a strip with a ball to drag."""
+    begin, end = (np.array([params.chosen, params.chosen + 1]) / params.N) * WIDTH
+    y = np.array([0.0, begin, begin, end, end, WIDTH])
+    z = np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0]) * HEIGHT * params.delta
+    points = np.array(params.task.strip) + np.stack([np.zeros(6), y, z], axis=1)
+    scene.trail("change", points, "force")
+    scene.handle("control", (points[2] + points[3]) / 2.0, BALL)
+    scene.label("of change", "change of u(t)", points[0] + np.array([0.0, 0.5 * WIDTH, -0.1]))
+
+
+def dragged_control(
+    params: SingleShootingParams, point: tuple[float, float, float]
+) -> dict[str, Value]:
+    """What the ball of the strip at `point` [m] says: which control, and its change."""
+    _, y, z = np.array(point) - params.task.strip
+    return {
+        "piece": params.nearest("piece", min(max(np.floor(y / WIDTH * params.N) + 1, 1), params.N)),
+        "delta": params.nearest("delta", z / HEIGHT),
+    }
+
+
+def world_line(at: System, X: np.ndarray, T: float) -> np.ndarray:
+    """(POINTS, 3) [m] of the tip along X (k + 1, nx) over T [s], moved back as time goes."""
+    t = np.linspace(0.0, T, POINTS)
+    tips = [at.mechanism.tip(state_at(X, T, time)[: at.mechanism.nq]) for time in t]
+    path: np.ndarray = np.array(tips) - SPEED * t[:, None] * np.array([1.0, 0.0, 0.0])
+    return path
+
+
+@lru_cache(maxsize=4)
+def _fan_lines(name: str, plan: Plan, k: int, change: float) -> tuple[np.ndarray, ...]:
+    """Of the motions with other controls u_k, the last as chosen."""
+    fan = changed_motions(name, plan, k, change).fan
+    return tuple(world_line(system(name), X, plan.T) for X in fan)
+
+
+def _piece(params: SingleShootingParams, plan: Plan) -> int:
+    """The changed piece, in a plan that may have fewer than are asked for now."""
+    return min(params.chosen, plan.N - 1)

@@ -114,7 +114,7 @@ class HeatMap:
     """A 2-D field z over 1-D fields x (columns) and y (rows). With `gaps` z may be NaN where
     there is no value: the cell stays empty. `arrows` names a field (k, 4) of arrows over it, such
     as a policy: x and y of the middle on the axes, then the way right and up on the screen, at
-    most 1 long; (0, 0) is a dot."""
+    most 1 long; (0, 0) is a dot. With `downward` y grows downward, as the rows of a matrix do."""
 
     title: str
     x: str
@@ -125,6 +125,7 @@ class HeatMap:
     z_label: str
     gaps: bool = False
     arrows: str = ""
+    downward: bool = False
     when: When = field(default_factory=dict, kw_only=True)
 
 

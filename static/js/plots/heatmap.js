@@ -74,7 +74,7 @@ export class HeatMap {
       margin: { l: 4.5 * size, r: size, t: 0.75 * size, b: 3.6 * size },
       showlegend: false, paper_bgcolor: "transparent", plot_bgcolor: "transparent",
       font: { family: "system-ui, sans-serif", size, color: colour("axis") },
-      xaxis: axis(xLabel), yaxis: axis(yLabel), uirevision: "keep",
+      xaxis: axis(xLabel), yaxis: { ...axis(yLabel), autorange: this.plot.downward ? "reversed" : true }, uirevision: "keep",
     };
     Plotly.react(this.body, [trace, ...this.arrowTraces()], layout, { displayModeBar: false, doubleClick: "reset" });
   }

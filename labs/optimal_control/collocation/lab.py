@@ -1,0 +1,239 @@
+"""Collocation (notes, 2.3.3): states and controls are the variables, the dynamics are constraints
+that the first iterations may miss."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from labs.algorithms import riccati, sqp
+from labs.algorithms.collocation import Collocation
+from labs.algorithms.sqp import Iterate
+from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot
+from labs.models.coordinates import coordinate_labels
+from labs.optimal_control.collocation.params import CollocationParams
+from labs.optimal_control.collocation.plots import (
+    PLOTS,
+    costate_fields,
+    iteration_fields,
+    motion_fields,
+    structure_fields,
+    study_fields,
+)
+from labs.optimal_control.collocation.structure import Structure, structure_of
+from labs.optimal_control.collocation.studies import NO_STUDY, Study, study_order, study_sizes
+from labs.optimal_control.collocation.transcription import (
+    Costates,
+    Variables,
+    costates,
+    motion_of,
+)
+from labs.params import Value
+from labs.resumable import Resumable, run_to_completion
+from labs.scene import Scene
+from labs.tasks.direct.guesses import first_guess, resampled
+from labs.tasks.direct.history import History
+from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots
+from labs.tasks.direct.player import (
+    PERIOD,
+    DirectState,
+    advanced,
+    dragged,
+    measured,
+    replayed,
+)
+from labs.tasks.direct.tracking import playable
+from labs.tasks.motion.playback import start_playback
+
+
+@dataclass(kw_only=True)
+class CollocationState(DirectState):
+    """The motion with what its programme looks like."""
+
+    variables: Variables
+    structure: Structure
+    costates: Costates
+    study: Study = NO_STUDY
+
+
+class CollocationLab(Lab[CollocationParams, CollocationState]):
+    """Plans a motion with its states as variables, and shows how the gaps between them close."""
+
+    title = "Collocation"
+    section = "2.3.3"
+    summary = (
+        "Plan states and controls together: watch the gaps of a motion close, look at matrices "
+        "that are nearly empty, and see what a finer grid or a better rule buys."
+    )
+    Params = CollocationParams
+    period = PERIOD
+    plots = PLOTS
+    presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
+        "Mass, least time": {"system": "mass", "objective": "least-time", "limit": 1.0},
+        "Weak motor": {"limited": True, "limit": 0.3, "horizon": 3.0, "guess": "controls"},
+        "Double pendulum": {"system": "double-pendulum"},
+        "Cart-pole": {"system": "cart-pole"},
+        "UR5 reach": {"system": "ur5", "horizon": 1.0},
+        "UR5 past an obstacle": {"system": "ur5", "horizon": 1.0, "obstacle": True},
+    }
+    handles = (
+        Handle("target", "The UR5's target."),
+        Handle("obstacle", "The ball that the UR5's tip must not enter."),
+    )
+
+    def init(self, params: CollocationParams, rng: np.random.Generator) -> CollocationState:
+        """The first guess is the first motion, with its gaps."""
+        program = params.program
+        at = sqp.init(program, program.variables(*first_guess(params, params.N)), params.options)
+        motion = motion_of(program, at)
+        plan = playable(params, motion)
+        at = replace(at, derivatives=program.derivatives(at.y))
+        return CollocationState(
+            motion=motion,
+            plan=plan,
+            history=History.start(params, at, motion),
+            playback=start_playback(plan),
+            missed=np.zeros(0),
+            variables=Variables(at.y, at.lam, at.mu, at.nu),
+            structure=run_to_completion(_structure(program, at)),
+            costates=costates(program, at),
+        )
+
+    # The solver's clock -----------------------------------------------------------------------
+
+    def solve(
+        self, params: CollocationParams, state: CollocationState
+    ) -> Iterator[Snapshot | None]:
+        """One iteration a snapshot, and what is measured besides with the last."""
+        program, seconds = params.program, dict[str, Any]()
+        at = _start(params, program, state)
+        if at.stopped:
+            yield Snapshot(1, _kept(state, seconds), at.stopped)
+            return
+        history, structure = History.start(params, at, motion_of(program, at)), None
+        while not at.stopped:
+            at = yield from sqp.step_in_pieces(program, params.options, at)
+            yield None
+            motion = motion_of(program, at)
+            history = history.append(params, at, motion)
+            yield None
+            if at.derivatives is None:
+                at = replace(at, derivatives=program.derivatives(at.y))
+            if structure is None or at.stopped:
+                structure = yield from _structure(program, at)
+            after = replace(
+                state,
+                motion=motion,
+                plan=playable(params, motion),
+                history=history,
+                failed=bool(at.stopped) and not at.converged,
+                variables=Variables(at.y, at.lam, at.mu, at.nu),
+                structure=structure,
+                costates=costates(program, at),
+                study=NO_STUDY,
+            )
+            if at.converged and params.study == "order":
+                after.study = yield from study_order(params, motion)
+            if at.converged and params.study == "sizes":
+                after.study = yield from study_sizes(params, motion, seconds)
+            yield Snapshot(max(at.iteration, 1), _kept(after, seconds), at.stopped)
+
+    def accept(
+        self, params: CollocationParams, state: CollocationState, snapshot: Snapshot
+    ) -> CollocationState:
+        """Whatever is taken in is played from its start."""
+        data = snapshot.data
+        names = ("motion", "plan", "history", "failed")
+        state = replayed(state, *(data[name] for name in names))
+        return replace(
+            state,
+            **{name: data[name] for name in ("variables", "structure", "costates", "study")},
+            seconds=data.get("seconds", {}),
+        )
+
+    def edit(
+        self, params: CollocationParams, handle: str, point: tuple[float, float, float]
+    ) -> Mapping[str, Value]:
+        """The balls are the UR5's target and its obstacle."""
+        return dragged(params, handle, point)
+
+    # The world's clock ------------------------------------------------------------------------
+
+    def step(
+        self, params: CollocationParams, inputs: Inputs, state: CollocationState
+    ) -> CollocationState:
+        """10 ms of both runs; at the end of the motion a rest, and then from the start."""
+        return advanced(params, state)
+
+    # What is shown ----------------------------------------------------------------------------
+
+    def measure(self, params: CollocationParams, state: CollocationState) -> Measurement:
+        """The runs, the iterations, and the size of the programme."""
+        structure, study = state.structure, state.study
+        found = measured(params, state) | {
+            "variables": float(structure.variables),
+            "constraints": float(structure.constraints),
+            "nonzeros": float(structure.nonzeros),
+            "density": 100.0 * structure.density,
+            "hessian_density": 100.0 * structure.hessian_density,
+        }
+        order = study.order_of(params.scheme)
+        return found | ({} if np.isnan(order) else {"order": order})
+
+    def fields(
+        self, params: CollocationParams, state: CollocationState
+    ) -> Mapping[str, np.ndarray]:
+        """Gaps, motion, matrices, costates and what was measured besides."""
+        joint = params.task.shown
+        return (
+            iteration_fields(state.history, state.motion.T)
+            | motion_fields(state, joint, params.task.u_0)
+            | structure_fields(state.structure)
+            | costate_fields(state.costates, joint)
+            | study_fields(state.study, state.seconds)
+        )
+
+    def labels(self, params: CollocationParams) -> Mapping[str, str | tuple[str, ...]]:
+        words, joint = coordinate_labels(params.task.mechanism), params.task.shown
+        name = {"mass": "position", "cart-pole": "pole", "ur5": "joint 2"}
+        shown = name.get(params.system, "angle")
+        return words | {"shown": shown, "shown_unit": words["q_unit"][joint]}
+
+    def draw(self, scene: Scene, params: CollocationParams, state: CollocationState) -> None:
+        """The robot, its open-loop ghost, and the pieces of the path."""
+        draw_robots(scene, params, state)
+        draw_paths(scene, params, state)
+        draw_goal(scene, params)
+
+    @classmethod
+    def prepare(cls) -> None:
+        """The regulator's recursion."""
+        riccati.prepare()
+
+
+def _start(params: CollocationParams, program: Collocation, state: CollocationState) -> Iterate:
+    """From the present solution, if there is one and it is wanted, with its multipliers if the grid
+    is the same."""
+    if params.start == "cold" or not state.history.iterations or state.failed:
+        y = program.variables(*first_guess(params, params.N))
+        return sqp.init(program, y, params.options)
+    last = state.variables
+    if len(last.y) != program.n:
+        y = program.variables(*resampled(params, state.motion, params.N))
+        return sqp.init(program, y, params.options)
+    at = sqp.init(program, last.y, params.options)
+    if len(last.lam) != len(at.lam) or len(last.mu) != len(at.mu):
+        return at
+    return replace(at, lam=last.lam, mu=last.mu, nu=last.nu)
+
+
+def _structure(program: Collocation, at: Iterate) -> Resumable[Structure]:
+    assert at.derivatives
+    L_yy = yield from program.hessian(at.y, at.lam, at.mu, exact=True)
+    return structure_of(at.derivatives.c_y, L_yy)
+
+
+def _kept(state: CollocationState, seconds: Mapping[str, Any]) -> dict[str, Any]:
+    names = ("motion", "plan", "history", "failed", "variables", "structure", "costates", "study")
+    return {name: getattr(state, name) for name in names} | {"seconds": seconds}

@@ -1,0 +1,98 @@
+"""What the direct methods are tried on, in collocation, and in multiple shooting and the race of
+direct methods to come: the motions of `labs.tasks.motion.continuous`, and a pendulum that has
+only to be caught, from a lean."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache, lru_cache
+
+import numpy as np
+
+from labs.algorithms.inverse_kinematics import damped_least_squares
+from labs.models.mechanisms import Mechanism, mechanism
+from labs.shapes import Vector3
+from labs.tasks.motion.continuous import CONTINUOUS_MOTIONS
+
+LEAN = 0.1
+"""[rad] by which the upright pendulum starts off."""
+TITLES: Mapping[str, str] = {
+    "mass": "Mass on a line",
+    "pendulum": "Pendulum, from hanging",
+    "upright": "Pendulum, upright",
+    "double-pendulum": "Double pendulum",
+    "cart-pole": "Cart-pole",
+    "ur5": "UR5, reaching",
+}
+CAMERAS: Mapping[str, tuple[Vector3, Vector3]] = {
+    "mass": ((2.2, 0.7, 1.45), (-0.1, 0.35, 0.4)),
+    "pendulum": ((1.6, 0.7, 1.15), (-0.1, 0.0, 0.6)),
+    "double-pendulum": ((2.7, 1.2, 1.9), (-0.1, 0.0, 1.05)),
+    "cart-pole": ((2.4, 0.8, 1.4), (-0.1, 0.0, 0.65)),
+    "ur5": CONTINUOUS_MOTIONS["ur5"].camera,
+}
+"""By motion: where a viewer stands and what it looks at [m], so that time is seen to run back."""
+REACH_STEPS, REACH_DAMPING = 60, 0.05
+"""Of inverse kinematics, for a posture with the tip at a target."""
+
+
+@dataclass(frozen=True, eq=False)
+class System:
+    """A mechanism with its task: to come from rest to rest at a goal."""
+
+    motion: str
+    """A key of CONTINUOUS_MOTIONS."""
+    mechanism: Mechanism
+    x0: np.ndarray
+    """(nx,)"""
+    goal: np.ndarray
+    """q* (nq,) [rad; m]; empty where the tip has a place to reach."""
+    u_0: np.ndarray
+    """(nu,) [N m; N] a natural size of the controls."""
+    holding: np.ndarray
+    """(nu,) what keeps it where it starts, were it at rest."""
+    shown: int
+    """The joint that tells most."""
+
+    @property
+    def camera(self) -> tuple[Vector3, Vector3]:
+        return CAMERAS[self.motion]
+
+    @property
+    def planar(self) -> bool:
+        """Whether motions lie in a plane, so that time can be drawn across it."""
+        return self.motion != "ur5"
+
+
+@cache
+def system(name: str) -> System:
+    """The one of this name, a key of TITLES."""
+    motion_name = "pendulum" if name == "upright" else name
+    motion, body = CONTINUOUS_MOTIONS[motion_name], mechanism(motion_name)
+    goal, home = np.array(motion.goal), body.arm.home
+    q0 = goal - LEAN if name == "upright" else home
+    return System(
+        motion_name,
+        body,
+        np.concatenate([q0, np.zeros(body.nq)]),
+        goal,
+        np.array(motion.control_scale),
+        body.holding(home),
+        motion.shown_joint,
+    )
+
+
+def reaching_posture(name: str, target: np.ndarray) -> np.ndarray:
+    """q (nq,) with the tip at, or as near as it comes to, `target` (3,) [m]; the goal of a system
+    that has one."""
+    goal = system(name).goal
+    return goal if len(goal) else np.array(_reaching(name, tuple(target.tolist())))
+
+
+@lru_cache(maxsize=8)
+def _reaching(name: str, target: tuple[float, ...]) -> tuple[float, ...]:
+    body = system(name).mechanism
+    q = body.arm.home
+    for _ in range(REACH_STEPS):
+        error = np.array(target) - body.tip(q)
+        q = q + damped_least_squares(body.tip_jacobian(q), error, REACH_DAMPING)
+    return tuple(q.tolist())

@@ -1,0 +1,135 @@
+"""Motions in pieces, first guesses, and plans that are played."""
+
+import numpy as np
+import pytest
+
+from labs.algorithms import sqp
+from labs.algorithms.collocation import Collocation
+from labs.models.mechanisms import mechanism
+from labs.scene import NullScene
+from labs.tasks.direct.guesses import first_guess, resampled
+from labs.tasks.direct.history import ARC_POINTS, KEPT, History
+from labs.tasks.direct.params import GUESSES, DirectParams
+from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots, joined
+from labs.tasks.direct.player import DirectState, advanced, dragged, measured, replayed
+from labs.tasks.direct.systems import TITLES
+from labs.tasks.direct.tracking import playable
+from labs.tasks.direct.trajectory import Trajectory
+from labs.tasks.motion.playback import FEEDBACK, OPEN_LOOP, start_playback
+
+T = 2.0
+
+
+def pushed(k: int = 8) -> Trajectory:
+    """The mass under u = 3 t - 1, exactly."""
+    t = np.linspace(0.0, T, k + 1)
+    X = np.stack([0.5 * t**3 - 0.5 * t**2, 1.5 * t**2 - t], axis=1)
+    u = 3.0 * t - 1.0
+    return Trajectory(T, X, X[1:], np.stack([u[:-1], u[1:]], axis=1)[:, :, None])
+
+
+def test_a_cubic_is_interpolated_exactly() -> None:
+    motion, t = pushed(), np.linspace(0.0, T, 31)
+    found = motion.states(mechanism("mass"), t)
+    np.testing.assert_allclose(found[:, 0], 0.5 * t**3 - 0.5 * t**2, atol=1e-12)
+    edges = np.array([0.0, 0.1, 0.33, 1.0, 1.9, 2.0])
+    mean = motion.mean_controls(edges)[:, 0]
+    np.testing.assert_allclose(mean, 1.5 * (edges[1:] + edges[:-1]) - 1.0, atol=1e-12)
+    beyond = motion.mean_controls(np.array([2.0, 2.1]))
+    assert beyond[0, 0] == pytest.approx(5.0)
+    np.testing.assert_allclose(motion.state(0.125), 0.5 * (motion.X[0] + motion.X[1]))
+
+
+@pytest.mark.parametrize("system", TITLES)
+@pytest.mark.parametrize("guess", GUESSES)
+def test_a_first_guess_starts_at_the_start(system: str, guess: str) -> None:
+    params = DirectParams(system=system, guess=guess)
+    X, U, horizon = first_guess(params, 7)
+    nx, nu = params.task.mechanism.nx, params.task.mechanism.nu
+    assert X.shape == (8, nx)
+    assert U.shape == (7, nu)
+    assert horizon == 2.0
+    assert np.isfinite(X).all()
+    np.testing.assert_array_equal(X[0], params.task.x0)
+    if guess == "line":
+        tip = params.task.mechanism.tip(X[-1, : nx // 2])
+        np.testing.assert_allclose(tip, params.goal_place, atol=1e-3)
+
+
+def test_a_path_is_parted_where_it_has_gaps() -> None:
+    arcs = np.zeros((4, 2, 3))
+    arcs[:, :, 0] = [[0.0, 1.0], [1.0, 2.0], [2.5, 3.0], [3.0, 4.0]]
+    first, second = joined(arcs)
+    assert first[-1, 0] == 2.0
+    assert second[0, 0] == 2.5
+
+
+def solved(params: DirectParams, N: int = 40) -> DirectState:
+    program = Collocation(params.problem, N, "trapezoidal")
+    at = sqp.init(program, program.variables(*first_guess(params, N)), params.options)
+    motions = [_motion(program, at)]
+    history = History.start(params, at, motions[0])
+    while not at.stopped:
+        at = sqp.step(program, params.options, at)
+        motions.append(_motion(program, at))
+        history = history.append(params, at, motions[-1])
+    assert at.converged, at.stopped
+    plan = playable(params, motions[-1])
+    state = DirectState(
+        motion=motions[0],
+        plan=plan,
+        history=history,
+        playback=start_playback(plan),
+        missed=np.zeros(0),
+    )
+    return replayed(state, motions[-1], plan, history, failed=False)
+
+
+def _motion(program: Collocation, at: sqp.Iterate) -> Trajectory:
+    T, X, U = program.trajectory(at.y)
+    both = np.stack([U[:-1], U[1:]], axis=1)
+    return Trajectory(T, X, X[1:] - program.defects(at.values.c), both)
+
+
+def test_a_plan_is_played_and_the_regulator_holds_it() -> None:
+    params = DirectParams(system="pendulum", payload=0.1)
+    state = solved(params)
+    history = state.history
+    assert history.gaps.shape == (history.iterations + 1, 40)
+    assert history.gaps[0].max() > 0.05
+    assert history.gaps[-1].max() < 1e-8
+    assert history.tips.shape == (KEPT, 40, ARC_POINTS, 3)
+    while not state.playback.finished(state.plan):
+        state = advanced(params, state)
+    assert state.missed[FEEDBACK] < 0.1 < state.missed[OPEN_LOOP]
+    assert measured(params, state)["missed"] == state.missed[FEEDBACK]
+    scene = NullScene()
+    draw_robots(scene, params, state)
+    draw_paths(scene, params, state)
+    draw_goal(scene, params)
+    assert {"robot", "open loop", "of open loop", "piece 1", "now", "goal"} <= set(scene.names)
+    plain = DirectParams(system="pendulum")
+    state = replayed(state, state.motion, state.plan, history, failed=False)
+    while not state.playback.finished(state.plan):
+        state = advanced(plain, state)
+    assert state.missed[FEEDBACK] < 1e-3, "the plant being as the plan has it"
+    assert state.missed[OPEN_LOOP] < 0.2, "the errors of 40 steps, grown near the unstable end"
+    again = resampled(params, state.motion, 20)
+    np.testing.assert_allclose(again.X, state.motion.X[::2], atol=1e-12)
+
+
+def test_balls_are_dragged() -> None:
+    params = DirectParams(system="ur5", obstacle=True)
+    assert dragged(params, "target", (0.301, 0.0, 2.0)) == {
+        "target_x": 0.3,
+        "target_y": 0.0,
+        "target_z": 1.0,
+    }
+    assert set(dragged(params, "obstacle", (0.1, 0.2, 0.3))) == {
+        "obstacle_x",
+        "obstacle_y",
+        "obstacle_z",
+    }
+    assert not dragged(params, "other", (0.0, 0.0, 0.0))
+    assert params.problem.path is not None
+    assert DirectParams(system="ur5", obstacle=True, soft=True).problem.path is None

@@ -1,0 +1,72 @@
+"""The tunables of multiple shooting, beside those of the motion."""
+
+import numpy as np
+
+from labs.algorithms.multiple_shooting import MultipleShooting
+from labs.algorithms.shooting_steps import METHODS
+from labs.params import Group
+from labs.tasks.direct.guesses import Guess
+from labs.tasks.direct.params import SOLVER, DirectParams
+from labs.tasks.direct.systems import TITLES
+
+MOST_PIECES, MOST_STEPS = 40, 4
+LIGHT = tuple(name for name in TITLES if name != "ur5")
+"""Systems whose derivatives cost little."""
+
+SHOOTING = Group("Shooting", effect="solve")
+
+
+class MultipleShootingParams(DirectParams):
+    """What the user can turn."""
+
+    segments: float = SHOOTING.knob(10.0, 1.0, MOST_PIECES, "m", "", "Segments", step=1.0, key=True)
+    """How often the integration begins anew: 1 is single shooting; at most one a piece."""
+    pieces: float = SHOOTING.knob(20.0, 2.0, MOST_PIECES, "N", "", "Pieces", step=1.0, key=True)
+    """How many pieces the control is held on, split evenly among the segments."""
+    steps: float = SHOOTING.knob(
+        2.0, 1.0, MOST_STEPS, "M", "", "Steps a piece", step=1.0, when={"system": LIGHT}
+    )
+    """Steps of integration in each piece. They add no variables. Of the UR5 it is one."""
+    integrator: str = SHOOTING.choice(
+        "rk4", {name: method.title for name, method in METHODS.items()}, "Integrator"
+    )
+    """By which the states of a segment follow from its start and its controls."""
+    study: str = SHOOTING.choice(
+        "none",
+        {"none": "None", "segments": "Other numbers of segments"},
+        "Compare",
+        when={"system": LIGHT},
+    )
+    """What is solved besides: the same problem from the same guess with 1, 2, 4, ... segments."""
+
+    start: str = SOLVER.choice(
+        "cold", {"warm": "Warm: the present solution", "cold": "Cold: the first guess"}, "Start"
+    )
+    """What a change of the problem is solved from."""
+
+    @property
+    def N(self) -> int:
+        return round(self.pieces)
+
+    @property
+    def m(self) -> int:
+        """Segments there are: no more than pieces."""
+        return min(round(self.segments), self.N)
+
+    @property
+    def M(self) -> int:
+        return round(self.steps) if self.system in LIGHT else 1
+
+    @property
+    def compares(self) -> bool:
+        return self.study == "segments" and self.system in LIGHT
+
+    def shooting(self, m: int) -> MultipleShooting:
+        """The programme with m segments."""
+        return MultipleShooting(self.problem, self.N, m, self.M, self.integrator)
+
+    def resting(self) -> Guess:
+        """Where it starts, held there: what diverges from nowhere."""
+        at = self.task
+        X, U = np.tile(at.x0, (self.N + 1, 1)), np.tile(at.holding, (self.N, 1))
+        return Guess(X, U, self.horizon)

@@ -1,0 +1,179 @@
+"""Direct methods compared (notes, 2.3.5): single shooting, multiple shooting and collocation solve
+one problem, side by side."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from labs.algorithms import riccati
+from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot
+from labs.models.coordinates import coordinate_labels
+from labs.optimal_control.direct_methods.methods import METHODS, SHORT
+from labs.optimal_control.direct_methods.params import DirectMethodsParams
+from labs.optimal_control.direct_methods.picture import draw_plans
+from labs.optimal_control.direct_methods.plots import (
+    PLOTS,
+    ROWS,
+    comparison_fields,
+    iteration_fields,
+    plan_fields,
+    race_readouts,
+)
+from labs.optimal_control.direct_methods.race import Race, lined_up, run_race, verdict
+from labs.params import Value
+from labs.scene import Scene
+from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots
+from labs.tasks.direct.player import PERIOD, DirectState, advanced, dragged, measured, replayed
+from labs.tasks.direct.tracking import playable
+from labs.tasks.motion.playback import start_playback
+
+
+@dataclass(kw_only=True)
+class DirectMethodsState(DirectState):
+    """The race, and whose motion is being played."""
+
+    race: Race
+    played: str
+
+
+class DirectMethodsLab(Lab[DirectMethodsParams, DirectMethodsState]):
+    """Solves one problem by the three direct methods, and compares them."""
+
+    title = "Direct methods"
+    section = "2.3.5"
+    summary = (
+        "Single shooting, multiple shooting and collocation race on the same problem: count what "
+        "each has to solve, see which of them fails and why, and play what they planned."
+    )
+    Params = DirectMethodsParams
+    period = PERIOD
+    plots = PLOTS
+    presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
+        "Upright": {"system": "upright"},
+        "Double pendulum": {"system": "double-pendulum", "segments": 10.0},
+        "Cart-pole": {"system": "cart-pole"},
+        "Mass, least time": {"system": "mass", "objective": "least-time", "limit": 1.0},
+        "UR5 reach": {"system": "ur5", "horizon": 1.0, "pieces": 10.0},
+        "UR5 past an obstacle": {
+            "system": "ur5",
+            "horizon": 1.0,
+            "pieces": 10.0,
+            "obstacle": True,
+        },
+    }
+    handles = (
+        Handle("target", "The UR5's target."),
+        Handle("obstacle", "The ball that the UR5's tip must not enter."),
+    )
+
+    def init(self, params: DirectMethodsParams, rng: np.random.Generator) -> DirectMethodsState:
+        """The first guess is the first motion of all three."""
+        race = lined_up(params)
+        entrant = race[params.played]
+        plan = playable(params, entrant.motion)
+        return DirectMethodsState(
+            motion=entrant.motion,
+            plan=plan,
+            history=entrant.history,
+            playback=start_playback(plan),
+            missed=np.zeros(0),
+            race=race,
+            played=params.played,
+        )
+
+    # The solver's clock -----------------------------------------------------------------------
+
+    def solve(
+        self, params: DirectMethodsParams, state: DirectMethodsState
+    ) -> Iterator[Snapshot | None]:
+        """A snapshot is an iteration of each method that has not stopped."""
+        seconds = dict[str, float]()
+        for race in run_race(params, state.race, seconds):
+            if race is None:
+                yield None
+                continue
+            done = verdict(race) if all(at.stopped for at in race.values()) else ""
+            iteration = max(1, *(at.history.iterations for at in race.values()))
+            yield Snapshot(iteration, {"race": race, "seconds": dict(seconds)}, done)
+
+    def accept(
+        self, params: DirectMethodsParams, state: DirectMethodsState, snapshot: Snapshot
+    ) -> DirectMethodsState:
+        """Whatever is taken in is played from its start."""
+        seconds = snapshot.data.get("seconds", {})
+        state = replace(state, race=snapshot.data["race"], seconds=seconds)
+        return _chosen(params, state)
+
+    def edit(
+        self, params: DirectMethodsParams, handle: str, point: tuple[float, float, float]
+    ) -> Mapping[str, Value]:
+        """The balls are the UR5's target and its obstacle."""
+        return dragged(params, handle, point)
+
+    # The world's clock ------------------------------------------------------------------------
+
+    def step(
+        self, params: DirectMethodsParams, inputs: Inputs, state: DirectMethodsState
+    ) -> DirectMethodsState:
+        """10 ms of the motion; at its end a rest, and then from the start."""
+        if state.played != params.played:
+            state = _chosen(params, state)
+        return advanced(params, state)
+
+    # What is shown ----------------------------------------------------------------------------
+
+    def measure(self, params: DirectMethodsParams, state: DirectMethodsState) -> Measurement:
+        """The run beside its plan, and how each method ended."""
+        return measured(params, state) | race_readouts(state.race)
+
+    def fields(
+        self, params: DirectMethodsParams, state: DirectMethodsState
+    ) -> Mapping[str, np.ndarray]:
+        """The iterations of all three, their motions, and what is compared."""
+        return (
+            iteration_fields(state.race)
+            | plan_fields(state.race, params.task.shown, params.task.u_0)
+            | comparison_fields(state.race, state.seconds)
+        )
+
+    def notes(self, params: DirectMethodsParams, state: DirectMethodsState) -> Mapping[str, str]:
+        """How each method fares, a line each."""
+        lines = [
+            f"{METHODS[name]}: {at.stopped or f'{at.history.iterations} iterations so far.'}"
+            for name, at in state.race.items()
+        ]
+        return {"verdicts": "\n".join(lines)}
+
+    def labels(self, params: DirectMethodsParams) -> Mapping[str, str | tuple[str, ...]]:
+        words, joint = coordinate_labels(params.task.mechanism), params.task.shown
+        name = {"mass": "position", "cart-pole": "pole", "ur5": "joint 2"}
+        shown = name.get(params.system, "angle")
+        unit = words["q_unit"][joint]
+        return words | {"shown": shown, "shown_unit": unit, "methods": SHORT, "rows": ROWS}
+
+    def draw(self, scene: Scene, params: DirectMethodsParams, state: DirectMethodsState) -> None:
+        """The three robots by their plans; or the one played, with its open-loop ghost."""
+        if params.view == "plans":
+            draw_plans(scene, params, state.race, state.playback.clock)
+        else:
+            draw_robots(scene, params, state)
+            draw_paths(scene, params, state)
+            draw_goal(scene, params)
+
+    @classmethod
+    def prepare(cls) -> None:
+        """The regulator's recursion, and an iteration of each method."""
+        riccati.prepare()
+        params = DirectMethodsParams(pieces=4.0, segments=2.0, steps=1.0)
+        race = lined_up(params)
+        next(at for at in run_race(params, race, {}) if at)
+
+
+def _chosen(params: DirectMethodsParams, state: DirectMethodsState) -> DirectMethodsState:
+    """With the plan that is to be played, from its start."""
+    entrant = state.race[params.played]
+    plan = playable(params, entrant.motion)
+    state = replayed(state, entrant.motion, plan, entrant.history, entrant.failed)
+    return replace(state, played=params.played)

@@ -1,0 +1,81 @@
+"""The three direct methods as one thing: a nonlinear programme, variables from a first guess, and
+the motion that an iterate stands for."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from labs.algorithms.collocation import Collocation
+from labs.algorithms.multiple_shooting import MultipleShooting
+from labs.algorithms.single_shooting import SingleShooting
+from labs.algorithms.sqp import Iterate
+from labs.problems.continuous_control import ContinuousProblem
+from labs.problems.nonlinear_program import NonlinearProgram
+from labs.tasks.direct.guesses import Guess
+from labs.tasks.direct.trajectory import Trajectory
+
+METHODS: Mapping[str, str] = {
+    "single": "Single shooting",
+    "multiple": "Multiple shooting",
+    "collocation": "Collocation",
+}
+SHORT = ("single", "multiple", "collocation")
+"""Where there is little room."""
+
+
+@dataclass(frozen=True)
+class Transcription:
+    """A problem as one of METHODS makes it finite."""
+
+    program: NonlinearProgram
+    variables: Callable[[Guess], np.ndarray]
+    """Of a first guess (n,): as much of it as the method takes."""
+    motion: Callable[[Iterate], Trajectory]
+    """Of an iterate, in pieces that join where they are integrated in one go."""
+    controls: np.ndarray
+    """Which variables are controls (N, nu)."""
+
+
+def transcribe(problem: ContinuousProblem, N: int, m: int, M: int) -> Mapping[str, Transcription]:
+    """By each method, with the control held on N pieces: of M steps of Runge-Kutta 4 in shooting,
+    in m segments; each one step of the midpoint rule in collocation."""
+    return {
+        "single": _single(SingleShooting(problem, N, M)),
+        "multiple": _multiple(MultipleShooting(problem, N, m, M)),
+        "collocation": _collocation(Collocation(problem, N)),
+    }
+
+
+def _single(shooting: SingleShooting) -> Transcription:
+    """Of the guess it takes the controls alone."""
+    controls = np.arange(shooting.N * shooting.nu).reshape(shooting.N, shooting.nu)
+
+    def motion(at: Iterate) -> Trajectory:
+        X = shooting.rollout(at.y).X
+        U = np.repeat(shooting.controls(at.y), shooting.M, axis=0)
+        return Trajectory(shooting.horizon(at.y), X, X[1:], np.stack([U, U], axis=1))
+
+    return Transcription(shooting, lambda at: shooting.pack(at.U, at.T), motion, controls)
+
+
+def _multiple(shooting: MultipleShooting) -> Transcription:
+    def motion(at: Iterate) -> Trajectory:
+        arcs = shooting.arcs(at.y)
+        X, U = np.concatenate([arcs.X, arcs.Y[-1:]]), arcs.W[:, :-1]
+        return Trajectory(shooting.horizon(at.y), X, arcs.Y, np.stack([U, U], axis=1))
+
+    return Transcription(
+        shooting, lambda at: shooting.variables(*at), motion, shooting.segments.controls
+    )
+
+
+def _collocation(program: Collocation) -> Transcription:
+    grid = program.grid
+
+    def motion(at: Iterate) -> Trajectory:
+        X, U = at.y[grid.nodes], at.y[grid.controls]
+        ends = X[1:] - program.defects(at.values.c)
+        return Trajectory(program.horizon(at.y), X, ends, np.stack([U, U], axis=1))
+
+    return Transcription(program, lambda at: program.variables(*at), motion, grid.controls)

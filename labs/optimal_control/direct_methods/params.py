@@ -1,0 +1,57 @@
+"""The tunables of the race, beside those of the motion."""
+
+from labs.optimal_control.direct_methods.methods import METHODS
+from labs.params import Group
+from labs.tasks.direct.params import SOLVER, WORLD, DirectParams
+from labs.tasks.direct.systems import TITLES
+
+MOST_PIECES, MOST_STEPS = 40, 4
+MOST_HEAVY_PIECES = 12
+"""Of the UR5, whose derivatives cost more."""
+LIGHT = tuple(name for name in TITLES if name != "ur5")
+VIEWS = {"plans": "The three plans", "played": "One plan, played"}
+
+TRANSCRIPTION = Group("Transcription", effect="solve")
+SCENE = Group("Scene")
+
+
+class DirectMethodsParams(DirectParams):
+    """What the user can turn."""
+
+    view: str = SCENE.choice("plans", VIEWS, "Show", key=True)
+    """The three motions as they are planned, side by side; or one of them on the simulator."""
+    played: str = WORLD.choice("collocation", METHODS, "Play", key=True)
+    """Whose plan the simulator plays: alone (open loop), and with a regulator about it."""
+
+    pieces: float = TRANSCRIPTION.knob(
+        20.0, 4.0, MOST_PIECES, "N", "", "Pieces", step=1.0, key=True
+    )
+    """How many pieces the control is held on, in all three; of the UR5 at most 12. They are the
+    steps of collocation, too."""
+    segments: float = TRANSCRIPTION.knob(
+        5.0, 2.0, MOST_PIECES, "m", "", "Segments", step=1.0, key=True
+    )
+    """Of multiple shooting: how often its integration begins anew; at most once a piece."""
+    steps: float = TRANSCRIPTION.knob(
+        2.0, 1.0, MOST_STEPS, "M", "", "Steps a piece", step=1.0, when={"system": LIGHT}
+    )
+    """Steps of Runge-Kutta 4 in each piece, in both kinds of shooting. Of the UR5 it is one."""
+
+    start: str = SOLVER.choice(
+        "cold", {"warm": "Warm: the present solution", "cold": "Cold: the first guess"}, "Start"
+    )
+    """What a change of the problem is solved from."""
+
+    @property
+    def N(self) -> int:
+        N = round(self.pieces)
+        return N if self.system in LIGHT else min(N, MOST_HEAVY_PIECES)
+
+    @property
+    def m(self) -> int:
+        """Segments there are: no more than pieces."""
+        return min(round(self.segments), self.N)
+
+    @property
+    def M(self) -> int:
+        return round(self.steps) if self.system in LIGHT else 1

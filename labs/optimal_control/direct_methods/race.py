@@ -1,0 +1,134 @@
+"""The race: every method solves the same problem from the same guess, an iteration each in turn."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from labs.algorithms import sqp
+from labs.algorithms.sqp import Iterate
+from labs.optimal_control.direct_methods.methods import METHODS, Transcription, transcribe
+from labs.optimal_control.direct_methods.params import DirectMethodsParams
+from labs.optimal_control.direct_methods.structure import Structure, structure_of
+from labs.resumable import Resumable, run_to_completion
+from labs.tasks.direct.guesses import Guess, first_guess, resampled
+from labs.tasks.direct.history import History
+from labs.tasks.direct.trajectory import Trajectory
+
+
+@dataclass(frozen=True, eq=False)
+class Entrant:
+    """How far one method is. Arrays are never written into again."""
+
+    motion: Trajectory
+    history: History
+    structure: Structure
+    stopped: str = ""
+    """Why, in a sentence; empty while it goes on."""
+    converged: bool = False
+
+    @property
+    def failed(self) -> bool:
+        return bool(self.stopped) and not self.converged
+
+
+Race = Mapping[str, Entrant]
+"""By the keys of METHODS."""
+
+
+def lined_up(params: DirectMethodsParams) -> Race:
+    """Before the first iteration."""
+    race = {}
+    for name, method in _transcriptions(params).items():
+        at = sqp.init(
+            method.program, method.variables(first_guess(params, params.N)), params.options
+        )
+        race[name] = run_to_completion(_entrant(params, method, at))
+    return race
+
+
+def run_race(
+    params: DirectMethodsParams, before: Race, seconds: dict[str, float]
+) -> Iterator[Race | None]:
+    """The race after each iteration of all that still go on; None within. `seconds` gets what an
+    iteration of each took on average [s]."""
+    methods = _transcriptions(params)
+    iterates, race = dict[str, Iterate](), dict[str, Entrant]()
+    total = dict.fromkeys(methods, 0.0)
+    for name, method in methods.items():
+        y = method.variables(_guess(params, before[name]))
+        iterates[name] = sqp.init(method.program, y, params.options)
+        race[name] = yield from _entrant(params, method, iterates[name])
+    if all(at.stopped for at in iterates.values()):
+        yield dict(race)
+    while not all(at.stopped for at in iterates.values()):
+        for name, method in methods.items():
+            at = iterates[name]
+            if at.stopped:
+                continue
+            at = yield from sqp.step_in_pieces(method.program, params.options, at)
+            yield None
+            iterates[name] = at
+            total[name] += sum(at.seconds.values())
+            seconds[name] = total[name] / max(at.iteration, 1)
+            race[name] = yield from _later(params, method, race[name], at)
+        yield dict(race)
+
+
+def verdict(race: Race) -> str:
+    """How all of them ended, in a line."""
+    if all(entrant.converged for entrant in race.values()):
+        counts = [f"{METHODS[name].lower()} {at.history.iterations}" for name, at in race.items()]
+        return f"All three converged. Iterations: {', '.join(counts)}."
+    return " ".join(f"{METHODS[name]}: {_short(entrant)}" for name, entrant in race.items())
+
+
+def _short(entrant: Entrant) -> str:
+    """The first thing that its sentence says, for there are three of them."""
+    if entrant.converged:
+        n = entrant.history.iterations
+        return f"converged after {n} iteration{'s'[: n != 1]}."
+    said = entrant.stopped.split("; ")[0].split(". ")[0].rstrip(".")
+    return f"{said[:1].lower()}{said[1:]}."
+
+
+def _transcriptions(params: DirectMethodsParams) -> Mapping[str, Transcription]:
+    return transcribe(params.problem, params.N, params.m, params.M)
+
+
+def _guess(params: DirectMethodsParams, before: Entrant) -> Guess:
+    """What to start from: the present solution, if there is one and it is wanted."""
+    if params.start == "cold" or not before.converged:
+        return first_guess(params, params.N)
+    return resampled(params, before.motion, params.N)
+
+
+def _entrant(params: DirectMethodsParams, method: Transcription, at: Iterate) -> Resumable[Entrant]:
+    """At its first guess; at rest at the start where that diverges."""
+    shown = at
+    if not np.isfinite(at.values.f):
+        task = params.task
+        X, U = np.tile(task.x0, (params.N + 1, 1)), np.tile(task.holding, (params.N, 1))
+        y = method.variables(Guess(X, U, params.horizon))
+        shown = sqp.init(method.program, y, params.options)
+    motion = method.motion(shown)
+    structure = yield from structure_of(method, shown, params.task.u_0, whole=False)
+    return Entrant(motion, History.start(params, shown, motion), structure, at.stopped)
+
+
+def _later(
+    params: DirectMethodsParams, method: Transcription, before: Entrant, at: Iterate
+) -> Resumable[Entrant]:
+    """An iteration later; once it has stopped, with all that is told of its programme."""
+    motion, structure = method.motion(at), before.structure
+    if at.stopped:
+        structure = yield from structure_of(method, at, params.task.u_0, whole=True)
+    history = before.history.append(params, at, motion)
+    return replace(
+        before,
+        motion=motion,
+        history=history,
+        structure=structure,
+        stopped=at.stopped,
+        converged=at.converged,
+    )

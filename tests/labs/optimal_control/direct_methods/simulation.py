@@ -1,0 +1,44 @@
+"""Races of the lab direct-methods, run to their end."""
+
+from collections.abc import Mapping
+
+from labs.engine.catalog import find
+from labs.engine.headless import run
+from labs.engine.run import World
+from labs.optimal_control.direct_methods.lab import DirectMethodsState
+from labs.optimal_control.direct_methods.race import Race
+from labs.params import Value
+
+Settings = Mapping[str, Value]
+NAMES = ("single", "multiple", "collocation")
+
+
+def solved(setting: Settings) -> World:
+    world = World(find("direct-methods"), setting)
+    while world.solving:
+        world.iterate()
+    return world
+
+
+def race(setting: Settings) -> Race:
+    return state(solved(setting)).race
+
+
+def state(world: World) -> DirectMethodsState:
+    assert isinstance(world.state, DirectMethodsState)
+    return world.state
+
+
+def iterations(found: Race) -> list[int]:
+    return [found[name].history.iterations for name in NAMES]
+
+
+def costs(found: Race) -> list[float]:
+    return [float(found[name].history.cost[-1]) for name in NAMES]
+
+
+def missed(setting: Settings) -> tuple[float, float]:
+    """By how much [m] the robot and its open-loop ghost miss the goal, once played."""
+    world = run("direct-methods", setting, seconds=2.4)
+    feedback, open_loop = state(world).missed
+    return float(feedback), float(open_loop)

@@ -256,7 +256,7 @@ class ViserScene:
             if node is not None:
                 node.remove()
             number, self._made[name] = self._made[name], self._made[name] + 1
-            node = self._nodes[name] = make(f"/{name} {number}" if number else f"/{name}")
+            node = self._nodes[name] = make(f"/{name}#{number}" if number else f"/{name}")
             node.appearance = appearance
         self._drawn[name] = None
         return node

@@ -186,17 +186,20 @@ def test_a_robot_in_anothers_place_has_nodes_of_its_own() -> None:
 
     def nodes() -> set[str]:
         there = server.scene._handle_from_node_name
-        return {name for name in there if name.startswith("/robot")}
+        return {name for name in there if name.startswith("/robot")} - {"/robot 1"}
 
     try:
         scene = ViserScene(server, Mailbox(), View(graphics="low"))
         past: set[str] = set()
+        scene.trail("robot 1", np.zeros((2, 3)))  # a name of the lab's own
+        trail = server.scene._handle_from_node_name["/robot 1"]
         for arm in (load("double-pendulum"), load("ur5"), load("double-pendulum")):
             for ghost in (False, True):
                 scene.arm("robot", arm, arm.home, ghost=ghost)
                 assert nodes()
                 assert not nodes() & past
                 past |= nodes()
+        assert server.scene._handle_from_node_name["/robot 1"] is trail
         scene.set_view(View(dark=True, graphics="low"))
         scene.arm("robot", arm, arm.home)
         assert nodes()

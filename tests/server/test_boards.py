@@ -102,7 +102,7 @@ def test_only_the_colours_of_a_board_are_sent_again_and_only_while_they_change(
         scene.wait_for_node("/board")
         updates("dark")  # what belongs to the first picture
         updates("light")
-        waving = {m["name"].split()[0]: m["updates"] for m in _later(scene, 120)}
+        waving = {m["name"].partition("#")[0]: m["updates"] for m in _later(scene, 120)}
         assert set(waving["/board"]) == {"batched_colors"}
         session.set(rate=0.0)
         updates("dark")  # what was under way

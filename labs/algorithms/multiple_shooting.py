@@ -23,7 +23,7 @@ from scipy.sparse import csc_array
 
 from labs.algorithms.assembly import Assembly, Terms
 from labs.algorithms.multiple_shooting_segments import Segments, congruent_sums, own_terms
-from labs.algorithms.shooting_steps import METHODS, CostForm, Linearization, Steps, advance
+from labs.algorithms.shooting_steps import CostForm, Linearization, Steps, advance, method_of
 from labs.algorithms.state_constraints import StateConstraints
 from labs.errors import LabError
 from labs.problems.continuous_control import ContinuousProblem
@@ -71,10 +71,7 @@ class MultipleShooting:
         method: str = "rk4",
         form: CostForm = "augmented",
     ) -> None:
-        if method not in METHODS:
-            raise LabError(f"no method is named {method!r}; there are {', '.join(METHODS)}")
-        if N < 1 or M < 1:
-            raise LabError(f"N = {N}, M = {M}: there is at least one piece, and one step in each")
+        scheme = method_of(method, N, M)
         if not 1 <= segments <= N:
             raise LabError(f"{segments} segments: there are from 1 to as many as pieces, N = {N}")
         self.problem, self.N, self.M = problem, N, M
@@ -82,7 +79,7 @@ class MultipleShooting:
         self.free_time = problem.T_limits is not None
         self.segments = Segments(N, segments, M, self.nx, self.nu, self.free_time)
         self.n = self.segments.n
-        self.steps = Steps(problem, METHODS[method], N * M, form)
+        self.steps = Steps(problem, scheme, N * M, form)
         self._constraints = StateConstraints(problem)
         T = problem.T_limits or (0.0, 0.0)
         X_lower, X_upper = (

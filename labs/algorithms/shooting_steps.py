@@ -23,6 +23,7 @@ import numpy as np
 
 from labs.algorithms.curvature import weighted_curvature
 from labs.algorithms.sensitivities import Sensitivities, stages
+from labs.errors import LabError
 from labs.problems.continuous_control import ContinuousProblem
 from labs.resumable import Resumable
 
@@ -45,6 +46,15 @@ METHODS: Mapping[str, Method] = {
     "rk4": Method("Runge-Kutta 4", 4, (0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
 }
 """By the names of `labs.algorithms.integrators.INTEGRATORS`."""
+
+
+def method_of(name: str, N: int, M: int) -> Method:
+    """The one of METHODS for N pieces of M steps. Raises LabError where there is none."""
+    if name not in METHODS:
+        raise LabError(f"no method is named {name!r}; there are {', '.join(METHODS)}")
+    if N < 1 or M < 1:
+        raise LabError(f"N = {N}, M = {M}: there is at least one piece, and one step in each")
+    return METHODS[name]
 
 
 def advance(

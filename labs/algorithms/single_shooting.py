@@ -27,9 +27,8 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from labs.algorithms.adjoint import adjoint_gradient
-from labs.algorithms.shooting_steps import METHODS, CostForm, Linearization, Steps
+from labs.algorithms.shooting_steps import CostForm, Linearization, Steps, method_of
 from labs.algorithms.state_constraints import StateConstraints
-from labs.errors import LabError
 from labs.problems.continuous_control import ContinuousProblem
 from labs.problems.nonlinear_program import Derivatives, Values
 from labs.problems.optimal_control import LARGEST_STATE, diverges_at
@@ -64,15 +63,12 @@ class SingleShooting:
         method: str = "rk4",
         form: CostForm = "augmented",
     ) -> None:
-        if method not in METHODS:
-            raise LabError(f"no method is named {method!r}; there are {', '.join(METHODS)}")
-        if N < 1 or M < 1:
-            raise LabError(f"N = {N}, M = {M}: there is at least one piece, and one step in each")
+        scheme = method_of(method, N, M)
         self.problem, self.N, self.M = problem, N, M
         self.nx, self.nu = problem.dynamics.nx, problem.dynamics.nu
         self.free_time = problem.T_limits is not None
         self.n = N * self.nu + self.free_time
-        self.steps = Steps(problem, METHODS[method], N * M, form)
+        self.steps = Steps(problem, scheme, N * M, form)
         self._constraints = StateConstraints(problem)
         self._rollout: Rollout | None = None
 

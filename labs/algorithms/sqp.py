@@ -24,6 +24,7 @@ from labs.algorithms import sqp_bfgs
 from labs.algorithms.sqp_filter import LARGEST_GROWTH, Filter, violation
 from labs.algorithms.sqp_iterate import Iterate as Iterate
 from labs.algorithms.sqp_iterate import Options as Options
+from labs.algorithms.sqp_iterate import Variables as Variables
 from labs.algorithms.sqp_optimality import optimality, worst_violation
 from labs.algorithms.sqp_step import moved
 from labs.errors import LabError
@@ -90,13 +91,13 @@ def solve(program: NonlinearProgram, y: np.ndarray, options: Options | None = No
     return at
 
 
-def restart(program: NonlinearProgram, at: Iterate, options: Options) -> Iterate:
+def restart(program: NonlinearProgram, last: Variables | Iterate, options: Options) -> Iterate:
     """From where another programme's iterate ended, with its multipliers where they fit: for a
     problem that is a little different."""
-    new = init(program, at.y, options)
-    if len(new.lam) != len(at.lam) or len(new.mu) != len(at.mu):
+    new = init(program, last.y, options)
+    if len(new.lam) != len(last.lam) or len(new.mu) != len(last.mu):
         return new
-    return replace(new, lam=at.lam, mu=at.mu, nu=at.nu, learnt=None)
+    return replace(new, lam=last.lam, mu=last.mu, nu=last.nu)
 
 
 def _expanded(program: NonlinearProgram, options: Options, at: Iterate) -> Resumable[Iterate]:

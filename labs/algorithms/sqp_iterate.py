@@ -41,6 +41,16 @@ class Options:
 
 
 @dataclass(frozen=True, eq=False)
+class Variables:
+    """Of an iterate, with its multipliers: what another solve may begin with."""
+
+    y: np.ndarray
+    lam: np.ndarray
+    mu: np.ndarray
+    nu: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
 class Iterate:
     """Where the solver is. Arrays are never written into again."""
 

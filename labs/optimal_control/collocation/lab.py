@@ -9,9 +9,8 @@ import numpy as np
 
 from labs.algorithms import riccati, sqp
 from labs.algorithms.collocation import Collocation
-from labs.algorithms.sqp import Iterate
+from labs.algorithms.sqp import Iterate, Variables
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot
-from labs.models.coordinates import coordinate_labels
 from labs.optimal_control.collocation.params import CollocationParams
 from labs.optimal_control.collocation.plots import (
     PLOTS,
@@ -23,23 +22,20 @@ from labs.optimal_control.collocation.plots import (
 )
 from labs.optimal_control.collocation.structure import Structure, structure_of
 from labs.optimal_control.collocation.studies import NO_STUDY, Study, study_order, study_sizes
-from labs.optimal_control.collocation.transcription import (
-    Costates,
-    Variables,
-    costates,
-    motion_of,
-)
+from labs.optimal_control.collocation.transcription import Costates, costates
 from labs.params import Value
 from labs.resumable import Resumable, run_to_completion
 from labs.scene import Scene
 from labs.tasks.direct.guesses import first_guess, resampled
 from labs.tasks.direct.history import History
+from labs.tasks.direct.motions import collocated_motion
 from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots
 from labs.tasks.direct.player import (
     PERIOD,
     DirectState,
     advanced,
     dragged,
+    labels_of,
     measured,
     replayed,
 )
@@ -86,7 +82,7 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
         """The first guess is the first motion, with its gaps."""
         program = params.program
         at = sqp.init(program, program.variables(*first_guess(params, params.N)), params.options)
-        motion = motion_of(program, at)
+        motion = collocated_motion(program, at)
         plan = playable(params, motion)
         at = replace(at, derivatives=program.derivatives(at.y))
         return CollocationState(
@@ -111,11 +107,11 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
         if at.stopped:
             yield Snapshot(1, _kept(state, seconds), at.stopped)
             return
-        history, structure = History.start(params, at, motion_of(program, at)), None
+        history, structure = History.start(params, at, collocated_motion(program, at)), None
         while not at.stopped:
             at = yield from sqp.step_in_pieces(program, params.options, at)
             yield None
-            motion = motion_of(program, at)
+            motion = collocated_motion(program, at)
             history = history.append(params, at, motion)
             yield None
             if at.derivatives is None:
@@ -195,10 +191,7 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
         )
 
     def labels(self, params: CollocationParams) -> Mapping[str, str | tuple[str, ...]]:
-        words, joint = coordinate_labels(params.task.mechanism), params.task.shown
-        name = {"mass": "position", "cart-pole": "pole", "ur5": "joint 2"}
-        shown = name.get(params.system, "angle")
-        return words | {"shown": shown, "shown_unit": words["q_unit"][joint]}
+        return labels_of(params)
 
     def draw(self, scene: Scene, params: CollocationParams, state: CollocationState) -> None:
         """The robot, its open-loop ghost, and the pieces of the path."""
@@ -222,10 +215,7 @@ def _start(params: CollocationParams, program: Collocation, state: CollocationSt
     if len(last.y) != program.n:
         y = program.variables(*resampled(params, state.motion, params.N))
         return sqp.init(program, y, params.options)
-    at = sqp.init(program, last.y, params.options)
-    if len(last.lam) != len(at.lam) or len(last.mu) != len(at.mu):
-        return at
-    return replace(at, lam=last.lam, mu=last.mu, nu=last.nu)
+    return sqp.restart(program, last, params.options)
 
 
 def _structure(program: Collocation, at: Iterate) -> Resumable[Structure]:

@@ -11,6 +11,7 @@ from labs.optimal_control.collocation.transcription import Costates
 from labs.plots import Curves, HeatMap, Line, Plot, Readout, TimeSeries, Trace
 from labs.tasks.direct.history import History
 from labs.tasks.direct.player import DirectState
+from labs.tasks.direct.plots import control_played, position_played
 from labs.tasks.motion.playback import FEEDBACK, OPEN_LOOP
 
 ORDER, SIZES = {"study": ("order",)}, {"study": ("sizes",)}
@@ -127,14 +128,7 @@ PLOTS: tuple[Plot, ...] = (
         Trace("states_q", "states_v", "states s", "points", 1),
         Trace("played_q0", "played_v0", "played with feedback", "line", 3),
     ),
-    TimeSeries(
-        "Position",
-        "{q_unit}",
-        Line("q", "q"),
-        Line("q_open", r"q^{\text{open}}", "dash"),
-        Line("q_plan", r"q^{\text{plan}}", "limit"),
-        select="joint",
-    ),
+    position_played(),
     TimeSeries(
         "Velocity",
         "{v_unit}",
@@ -143,13 +137,7 @@ PLOTS: tuple[Plot, ...] = (
         Line("v_plan", r"v^{\text{plan}}", "limit"),
         select="joint",
     ),
-    TimeSeries(
-        "Control",
-        "{u_unit}",
-        Line("u", "u"),
-        Line("u_plan", r"u^{\text{plan}}", "limit"),
-        select="motor",
-    ),
+    control_played(),
     Readout("iteration", "Iterations", "", whole=True),
     Readout("cost", "Cost J", ""),
     Readout("largest_gap", "Largest gap", ""),

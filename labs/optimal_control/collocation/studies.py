@@ -13,9 +13,9 @@ from labs.algorithms.collocation import Collocation
 from labs.algorithms.collocation_schemes import SCHEMES
 from labs.algorithms.sqp import Iterate, Options
 from labs.optimal_control.collocation.params import CollocationParams
-from labs.optimal_control.collocation.transcription import motion_of
 from labs.resumable import Resumable
 from labs.tasks.direct.guesses import resampled
+from labs.tasks.direct.motions import collocated_motion
 from labs.tasks.direct.trajectory import Trajectory
 
 ORDER_STEPS = (10, 20, 40, 80)
@@ -66,7 +66,7 @@ def study_order(params: CollocationParams, motion: Trajectory) -> Resumable[Stud
     fine = yield from _solved(params, EXACT_STEPS, EXACT_RULE, motion)
     if not fine.converged:
         return NO_STUDY
-    exact = motion_of(params.transcription(EXACT_STEPS, EXACT_RULE), fine)
+    exact = collocated_motion(params.transcription(EXACT_STEPS, EXACT_RULE), fine)
     J, errors = fine.values.f, np.zeros((len(ORDER_STEPS), len(SCHEMES)))
     for i, N in enumerate(ORDER_STEPS):
         for j, scheme in enumerate(SCHEMES):

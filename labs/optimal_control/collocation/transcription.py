@@ -1,4 +1,4 @@
-"""What the variables and multipliers of collocation mean: a motion in pieces, and costates."""
+"""What the multipliers of collocation mean: costates."""
 
 from dataclasses import dataclass
 
@@ -6,26 +6,7 @@ import numpy as np
 
 from labs.algorithms.collocation import Collocation
 from labs.algorithms.sqp import Iterate
-from labs.tasks.direct.trajectory import Trajectory
-
-
-@dataclass(frozen=True, eq=False)
-class Variables:
-    """Of an iterate, with its multipliers: what the next solve begins with."""
-
-    y: np.ndarray
-    lam: np.ndarray
-    mu: np.ndarray
-    nu: np.ndarray
-
-
-def motion_of(program: Collocation, at: Iterate) -> Trajectory:
-    """A piece for each kind of defect a step has; the defect is its gap."""
-    grid, y, nx = program.grid, at.y, program.problem.dynamics.nx
-    X, U = y[grid.states], y[grid.controls]
-    both = (U, U) if program.scheme.between else (U[:-1], U[1:])
-    defects = at.values.c[nx : nx + grid.rows.size].reshape(-1, nx)
-    return Trajectory(program.horizon(y), X, X[1:] - defects, np.stack(both, axis=1))
+from labs.tasks.direct.motions import collocated_motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +31,7 @@ def costates(program: Collocation, at: Iterate) -> Costates:
 
     backward by the trapezoidal rule; limits and constraints of a state push p where they act."""
     assert at.derivatives
-    problem, motion, grid = program.problem, motion_of(program, at), program.grid
+    problem, motion, grid = program.problem, collocated_motion(program, at), program.grid
     nx, N, h = problem.dynamics.nx, program.N, motion.T / program.N
     first_after = nx + grid.rows.size
     of_end = at.derivatives.c_y[first_after:].T @ at.lam[first_after:]

@@ -9,7 +9,6 @@ import numpy as np
 
 from labs.algorithms import riccati
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot
-from labs.models.coordinates import coordinate_labels
 from labs.optimal_control.direct_methods.methods import METHODS, SHORT
 from labs.optimal_control.direct_methods.params import DirectMethodsParams
 from labs.optimal_control.direct_methods.picture import draw_plans
@@ -25,7 +24,15 @@ from labs.optimal_control.direct_methods.race import Race, lined_up, run_race, v
 from labs.params import Value
 from labs.scene import Scene
 from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots
-from labs.tasks.direct.player import PERIOD, DirectState, advanced, dragged, measured, replayed
+from labs.tasks.direct.player import (
+    PERIOD,
+    DirectState,
+    advanced,
+    dragged,
+    labels_of,
+    measured,
+    replayed,
+)
 from labs.tasks.direct.tracking import playable
 from labs.tasks.motion.playback import start_playback
 
@@ -147,11 +154,7 @@ class DirectMethodsLab(Lab[DirectMethodsParams, DirectMethodsState]):
         return {"verdicts": "\n".join(lines)}
 
     def labels(self, params: DirectMethodsParams) -> Mapping[str, str | tuple[str, ...]]:
-        words, joint = coordinate_labels(params.task.mechanism), params.task.shown
-        name = {"mass": "position", "cart-pole": "pole", "ur5": "joint 2"}
-        shown = name.get(params.system, "angle")
-        unit = words["q_unit"][joint]
-        return words | {"shown": shown, "shown_unit": unit, "methods": SHORT, "rows": ROWS}
+        return labels_of(params) | {"methods": SHORT, "rows": ROWS}
 
     def draw(self, scene: Scene, params: DirectMethodsParams, state: DirectMethodsState) -> None:
         """The three robots by their plans; or the one played, with its open-loop ghost."""

@@ -13,6 +13,11 @@ from labs.algorithms.sqp import Iterate
 from labs.problems.continuous_control import ContinuousProblem
 from labs.problems.nonlinear_program import NonlinearProgram
 from labs.tasks.direct.guesses import Guess
+from labs.tasks.direct.motions import (
+    collocated_motion,
+    multiple_shooting_motion,
+    single_shooting_motion,
+)
 from labs.tasks.direct.trajectory import Trajectory
 
 METHODS: Mapping[str, str] = {
@@ -49,33 +54,27 @@ def transcribe(problem: ContinuousProblem, N: int, m: int, M: int) -> Mapping[st
 
 def _single(shooting: SingleShooting) -> Transcription:
     """Of the guess it takes the controls alone."""
-    controls = np.arange(shooting.N * shooting.nu).reshape(shooting.N, shooting.nu)
-
-    def motion(at: Iterate) -> Trajectory:
-        X = shooting.rollout(at.y).X
-        U = np.repeat(shooting.controls(at.y), shooting.M, axis=0)
-        return Trajectory(shooting.horizon(at.y), X, X[1:], np.stack([U, U], axis=1))
-
-    return Transcription(shooting, lambda at: shooting.pack(at.U, at.T), motion, controls)
+    return Transcription(
+        shooting,
+        lambda guess: shooting.pack(guess.U, guess.T),
+        lambda at: single_shooting_motion(shooting, at.y),
+        np.arange(shooting.N * shooting.nu).reshape(shooting.N, shooting.nu),
+    )
 
 
 def _multiple(shooting: MultipleShooting) -> Transcription:
-    def motion(at: Iterate) -> Trajectory:
-        arcs = shooting.arcs(at.y)
-        X, U = np.concatenate([arcs.X, arcs.Y[-1:]]), arcs.W[:, :-1]
-        return Trajectory(shooting.horizon(at.y), X, arcs.Y, np.stack([U, U], axis=1))
-
     return Transcription(
-        shooting, lambda at: shooting.variables(*at), motion, shooting.segments.controls
+        shooting,
+        lambda guess: shooting.variables(*guess),
+        lambda at: multiple_shooting_motion(shooting, at.y),
+        shooting.segments.controls,
     )
 
 
 def _collocation(program: Collocation) -> Transcription:
-    grid = program.grid
-
-    def motion(at: Iterate) -> Trajectory:
-        X, U = at.y[grid.nodes], at.y[grid.controls]
-        ends = X[1:] - program.defects(at.values.c)
-        return Trajectory(program.horizon(at.y), X, ends, np.stack([U, U], axis=1))
-
-    return Transcription(program, lambda at: program.variables(*at), motion, grid.controls)
+    return Transcription(
+        program,
+        lambda guess: program.variables(*guess),
+        lambda at: collocated_motion(program, at),
+        program.grid.controls,
+    )

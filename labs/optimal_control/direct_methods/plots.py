@@ -7,7 +7,8 @@ import numpy as np
 
 from labs.optimal_control.direct_methods.methods import SHORT
 from labs.optimal_control.direct_methods.race import Race
-from labs.plots import Bars, Curves, Line, Matrix, Note, Plot, Readout, TimeSeries, Trace
+from labs.plots import Bars, Curves, Matrix, Note, Plot, Readout, Trace
+from labs.tasks.direct.plots import control_played, position_played
 
 SERIES = (1, 2, 4)
 """Colours of the methods, near those of their robots."""
@@ -46,21 +47,8 @@ PLOTS: tuple[Plot, ...] = (
     Bars("Nonlinearity", "nonlinearity", r"\eta", "", names="methods"),
     Bars("Density", "density", r"\rho", "%", names="methods"),
     Note("How each fares", "verdicts"),
-    TimeSeries(
-        "Position played",
-        "{q_unit}",
-        Line("q", "q"),
-        Line("q_open", r"q^{\text{open}}", "dash"),
-        Line("q_plan", r"q^{\text{plan}}", "limit"),
-        select="joint",
-    ),
-    TimeSeries(
-        "Control played",
-        "{u_unit}",
-        Line("u", "u"),
-        Line("u_plan", r"u^{\text{plan}}", "limit"),
-        select="motor",
-    ),
+    position_played("Position played"),
+    control_played("Control played"),
     *(Readout(f"iterations_{name}", f"Iterations, {name}", "", whole=True) for name in SHORT),
     *(Readout(f"cost_{name}", f"Cost, {name}", "") for name in SHORT),
     Readout("T", "Time T", "s", when={"objective": ("least-time",)}),

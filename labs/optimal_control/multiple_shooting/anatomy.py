@@ -8,7 +8,6 @@ from scipy.sparse import block_array, csc_array
 
 from labs.algorithms.multiple_shooting import MultipleShooting
 from labs.resumable import Resumable
-from labs.tasks.direct.trajectory import Trajectory
 
 LARGEST = 250
 """Rows of the equations whose condition number is computed, at most."""
@@ -43,14 +42,6 @@ class Anatomy:
     def density(self) -> float:
         """Of L_zz and c_z."""
         return self.nonzeros / (self.variables * (self.variables + self.equalities))
-
-
-def motion_of(shooting: MultipleShooting, z: np.ndarray) -> Trajectory:
-    """Step by step. There are gaps where a segment begins."""
-    arcs = shooting.arcs(z)
-    U = arcs.W[:, :-1]
-    X = np.concatenate([arcs.X, arcs.Y[-1:]])
-    return Trajectory(shooting.horizon(z), X, arcs.Y, np.stack([U, U], axis=1))
 
 
 def anatomy(shooting: MultipleShooting, z: np.ndarray, u_0: np.ndarray) -> Resumable[Anatomy]:

@@ -11,7 +11,7 @@ from labs.algorithms import sqp
 from labs.algorithms.multiple_shooting import MultipleShooting
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot
 from labs.models.coordinates import coordinate_labels
-from labs.optimal_control.multiple_shooting.anatomy import Anatomy, anatomy, motion_of
+from labs.optimal_control.multiple_shooting.anatomy import Anatomy, anatomy
 from labs.optimal_control.multiple_shooting.params import MultipleShootingParams
 from labs.optimal_control.multiple_shooting.picture import draw_segments
 from labs.optimal_control.multiple_shooting.plots import (
@@ -26,6 +26,7 @@ from labs.resumable import run_to_completion
 from labs.scene import Scene
 from labs.tasks.direct.guesses import first_guess, resampled
 from labs.tasks.direct.history import History
+from labs.tasks.direct.motions import multiple_shooting_motion
 from labs.tasks.direct.picture import draw_goal, draw_now, draw_robots
 from labs.tasks.direct.player import PERIOD, DirectState, advanced, dragged, measured, replayed
 from labs.tasks.direct.tracking import playable
@@ -73,7 +74,7 @@ class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
         if not np.isfinite(shooting.values(z).f):
             guess = params.resting()
             z = shooting.variables(guess.X, guess.U, guess.T)
-        at, motion = sqp.init(shooting, z, params.options), motion_of(shooting, z)
+        at, motion = sqp.init(shooting, z, params.options), multiple_shooting_motion(shooting, z)
         plan = playable(params, motion)
         return MultipleShootingState(
             motion=motion,
@@ -96,12 +97,12 @@ class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
         if at.stopped:
             yield Snapshot(1, _data(state, failed=True), at.stopped)
             return
-        motion = motion_of(shooting, at.y)
+        motion = multiple_shooting_motion(shooting, at.y)
         history = History.start(params, at, motion)
         while not at.stopped:
             at = yield from sqp.step_in_pieces(shooting, options, at)
             yield None
-            motion = motion_of(shooting, at.y)
+            motion = multiple_shooting_motion(shooting, at.y)
             history = history.append(params, at, motion)
             yield None
             found = yield from anatomy(shooting, at.y, params.task.u_0)

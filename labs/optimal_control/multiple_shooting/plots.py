@@ -7,8 +7,9 @@ import numpy as np
 from labs.optimal_control.multiple_shooting.anatomy import Anatomy
 from labs.optimal_control.multiple_shooting.params import LIGHT
 from labs.optimal_control.multiple_shooting.study import Study
-from labs.plots import Curves, HeatMap, Line, Plot, Readout, TimeSeries, Trace
+from labs.plots import Curves, HeatMap, Plot, Readout, Trace
 from labs.tasks.direct.history import History
+from labs.tasks.direct.plots import control_played, position_played
 
 ROUNDING = 1e-12
 """Constraints that are off by less are met: a logarithmic axis leaves that out."""
@@ -95,21 +96,8 @@ PLOTS: tuple[Plot, ...] = (
         log_y=True,
         when=SEGMENTS,
     ),
-    TimeSeries(
-        "Position",
-        "{q_unit}",
-        Line("q", "q"),
-        Line("q_open", r"q^{\text{open}}", "dash"),
-        Line("q_plan", r"q^{\text{plan}}", "limit"),
-        select="joint",
-    ),
-    TimeSeries(
-        "Control",
-        "{u_unit}",
-        Line("u", "u"),
-        Line("u_plan", r"u^{\text{plan}}", "limit"),
-        select="motor",
-    ),
+    position_played(),
+    control_played(),
     Readout("cost", "Cost J", ""),
     Readout("iteration", "Iterations", "", whole=True),
     Readout("largest_gap", "Largest gap", ""),

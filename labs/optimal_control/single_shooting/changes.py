@@ -9,7 +9,9 @@ import numpy as np
 from labs.algorithms.single_shooting import SingleShooting
 from labs.arrays import with_row
 from labs.optimal_control.single_shooting.plan import Plan, held_where_diverged
-from labs.optimal_control.single_shooting.systems import system
+from labs.problems.continuous_control import ContinuousProblem
+from labs.tasks.direct.systems import system
+from labs.tasks.motion.continuous import continuous_motion
 
 FAN = (-1.0, -2 / 3, -1 / 3, 1 / 3, 2 / 3, 1.0)
 """The changes that are shown, in parts of the chosen one, which is the last."""
@@ -76,7 +78,9 @@ def _sensitivity(name: str, plan: Plan, k: int) -> np.ndarray:
 
 
 def _tail(name: str, plan: Plan, k: int) -> SingleShooting:
-    """From piece k to the end."""
-    T = plan.T * (1.0 - k / plan.N)
-    x = plan.X[k * plan.M]
-    return system(name).shooting(x, plan.N - k, T, plan.M, plan.integrator)
+    """From piece k to the end, its controls free."""
+    at, T = system(name), plan.T * (1.0 - k / plan.N)
+    x, u = np.full(at.mechanism.nx, np.inf), np.full(at.mechanism.nu, np.inf)
+    cost = continuous_motion(at.motion, "least-energy", T).cost
+    problem = ContinuousProblem(at.mechanism, cost, plan.X[k * plan.M], T, -x, x, -u, u)
+    return SingleShooting(problem, plan.N - k, plan.M, plan.integrator)

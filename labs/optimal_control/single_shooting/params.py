@@ -7,13 +7,14 @@ import numpy as np
 from labs.algorithms.shooting_steps import FORMS, METHODS, CostForm
 from labs.algorithms.single_shooting import SingleShooting
 from labs.algorithms.sqp_iterate import HESSIANS
-from labs.optimal_control.single_shooting.systems import TITLES, System, system
 from labs.params import Group, Params
 from labs.problems.continuous_control import ContinuousProblem
+from labs.tasks.direct.systems import TITLES, System, system
 from labs.tasks.motion.continuous import OBJECTIVES, MotionLimits, continuous_motion
 from labs.tasks.motion.motions import MotionWeights
 
 MOST_PIECES, MOST_STEPS = 60, 8
+PLANAR = {name: title for name, title in TITLES.items() if system(name).planar}
 T_LIMITS = (0.2, 6.0)
 """[s] of a free horizon."""
 NEEDS_LIMIT = ("least-time", "fastest-end")
@@ -32,7 +33,7 @@ SOLVER = Group("Solver", effect="solve")
 class SingleShootingParams(Params):
     """What the user can turn."""
 
-    system: str = MOTION.choice("pendulum", TITLES, "System", key=True)
+    system: str = MOTION.choice("pendulum", PLANAR, "System", key=True)
     """What moves: from rest to rest; all but the upright pendulum hang at first."""
     objective: str = MOTION.choice("least-energy", OBJECTIVES, "Minimise", key=True)
     """What is minimised. All but the weighted one end at the goal exactly."""

@@ -1,6 +1,7 @@
 """The motion in its scene. Time runs away from the viewer: the path of a tip is drawn as it would
 be if the world moved back at SPEED, so that motions along one circle part."""
 
+from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
@@ -9,10 +10,25 @@ from labs.optimal_control.single_shooting.changes import changed_motions
 from labs.optimal_control.single_shooting.history import KEPT
 from labs.optimal_control.single_shooting.params import SingleShootingParams
 from labs.optimal_control.single_shooting.plan import Plan, state_at
-from labs.optimal_control.single_shooting.systems import System, system
 from labs.params import Value
 from labs.scene import Scene
+from labs.shapes import Vector3
+from labs.tasks.direct.systems import System, system
 
+CAMERAS: Mapping[str, tuple[Vector3, Vector3]] = {
+    "mass": ((2.2, 0.7, 1.45), (-0.1, 0.35, 0.4)),
+    "pendulum": ((1.5, 0.8, 1.05), (-0.1, 0.2, 0.7)),
+    "double-pendulum": ((2.6, 1.4, 1.9), (-0.1, 0.3, 1.2)),
+    "cart-pole": ((2.4, 0.8, 1.4), (-0.1, 0.0, 0.65)),
+}
+"""By motion: where a viewer stands and what it looks at [m], so that time is seen to run back."""
+STRIPS: Mapping[str, Vector3] = {
+    "mass": (0.2, 0.0, 0.2),
+    "pendulum": (0.0, 0.65, 0.6),
+    "double-pendulum": (0.0, 1.15, 1.0),
+    "cart-pole": (0.2, -0.4, 0.12),
+}
+"""Where the strip of the control's change begins [m]: beside what swings, below what slides."""
 SPEED = 0.2
 """[m/s] along -x."""
 POINTS = 80
@@ -32,7 +48,7 @@ def draw_robots(scene: Scene, params: SingleShootingParams, plan: Plan, t: float
     would have it; without a change, where the plan has it."""
     at = params.task
     arm, n = at.mechanism.arm, at.mechanism.nq
-    scene.camera(*at.camera)
+    scene.camera(*CAMERAS[at.motion])
     x = state_at(plan.played(params.feedback)[0], plan.T, t)
     piece = _piece(params, plan)
     changed = changed_motions(params.system, plan, piece, params.delta).fan[-1]
@@ -74,7 +90,7 @@ def draw_change(scene: Scene, params: SingleShootingParams) -> None:
     begin, end = (np.array([params.chosen, params.chosen + 1]) / params.N) * WIDTH
     y = np.array([0.0, begin, begin, end, end, WIDTH])
     z = np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0]) * HEIGHT * params.delta
-    points = np.array(params.task.strip) + np.stack([np.zeros(6), y, z], axis=1)
+    points = np.array(STRIPS[params.task.motion]) + np.stack([np.zeros(6), y, z], axis=1)
     scene.trail("change", points, "force")
     scene.handle("control", (points[2] + points[3]) / 2.0, BALL)
     scene.label("of change", "change of u(t)", points[0] + np.array([0.0, 0.5 * WIDTH, -0.1]))
@@ -84,7 +100,7 @@ def dragged_control(
     params: SingleShootingParams, point: tuple[float, float, float]
 ) -> dict[str, Value]:
     """What the ball of the strip at `point` [m] says: which control, and its change."""
-    _, y, z = np.array(point) - params.task.strip
+    _, y, z = np.array(point) - STRIPS[params.task.motion]
     return {
         "piece": params.nearest("piece", min(max(np.floor(y / WIDTH * params.N) + 1, 1), params.N)),
         "delta": params.nearest("delta", z / HEIGHT),

@@ -13,9 +13,9 @@ from labs.algorithms import riccati
 from labs.algorithms.integrators import rk4
 from labs.algorithms.shooting_steps import Linearization
 from labs.errors import LabError
-from labs.optimal_control.single_shooting.systems import System
 from labs.problems.linear_quadratic import LqrProblem
 from labs.problems.optimal_control import LARGEST_STATE
+from labs.tasks.direct.systems import System
 
 STEP = 0.01
 """[s] The most a step of the simulation takes; it goes by RK4."""

@@ -1,5 +1,5 @@
-"""What a direct method begins with, in collocation, and in multiple shooting and the race of direct
-methods to come."""
+"""What a direct method begins with, in collocation, multiple shooting and the race of direct
+methods."""
 
 from typing import NamedTuple
 

@@ -1,5 +1,5 @@
-"""What is kept of the iterations of a direct method, to be plotted and drawn, in collocation, and
-in multiple shooting and the race of direct methods to come."""
+"""What is kept of the iterations of a direct method, to be plotted and drawn, in collocation,
+multiple shooting and the race of direct methods."""
 
 from dataclasses import dataclass
 from typing import Self

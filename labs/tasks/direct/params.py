@@ -1,5 +1,5 @@
-"""The tunables of a motion to plan by a direct method, in collocation, and in multiple shooting and
-the race of direct methods to come."""
+"""The tunables of a motion to plan by a direct method, in collocation, multiple shooting and the
+race of direct methods."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
-"""The motion of a direct method in its scene, in collocation, and in multiple shooting and the race
-of direct methods to come: the pieces of the path, parted where they do not join."""
+"""The motion of a direct method in its scene, in collocation, multiple shooting and the race of
+direct methods: the pieces of the path, parted where they do not join."""
 
 import numpy as np
 

@@ -1,5 +1,5 @@
-"""How the plan of a direct method is found and played, in collocation, and in multiple shooting and
-the race of direct methods to come: on the plant, in open loop beside a regulator about it."""
+"""How the plan of a direct method is found and played, in collocation, multiple shooting and
+the race of direct methods: on the plant, in open loop beside a regulator about it."""
 
 from dataclasses import dataclass, replace
 from typing import TypeVar
@@ -7,6 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from labs.lab import State
+from labs.models.coordinates import coordinate_labels
 from labs.models.mechanisms import Mechanism, mechanism
 from labs.params import Value
 from labs.tasks.direct.history import History
@@ -124,6 +125,14 @@ def dragged(
         return {}
     names = (f"{handle}_{axis}" for axis in "xyz")
     return {name: params.nearest(name, x) for name, x in zip(names, point, strict=True)}
+
+
+def labels_of(params: DirectParams) -> dict[str, str | tuple[str, ...]]:
+    """Of coordinates, and of the one that tells most."""
+    words, joint = coordinate_labels(params.task.mechanism), params.task.shown
+    name = {"mass": "position", "cart-pole": "pole", "ur5": "joint 2"}
+    shown = name.get(params.system, "angle")
+    return {**words, "shown": shown, "shown_unit": words["q_unit"][joint]}
 
 
 def loaded(params: DirectParams) -> Mechanism:

@@ -1,5 +1,5 @@
-"""What the direct methods are tried on, in collocation, and in multiple shooting and the race of
-direct methods to come: the motions of `labs.tasks.motion.continuous`, and a pendulum that has
+"""What the direct methods are tried on, single and multiple shooting, collocation and their
+race: the motions of `labs.tasks.motion.continuous`, and a pendulum that has
 only to be caught, from a lean."""
 
 from collections.abc import Mapping

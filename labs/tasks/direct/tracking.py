@@ -1,5 +1,5 @@
-"""A plan of a direct method made ready to be played, in collocation, and in multiple shooting and
-the race of direct methods to come: at ticks, with a linear-quadratic regulator about it that
+"""A plan of a direct method made ready to be played, in collocation, multiple shooting and the
+race of direct methods: at ticks, with a linear-quadratic regulator about it that
 brings the state back,
 
     minimise  sum_k w |dq_k|^2 + w_v |dv_k|^2 + |du_k / u_0|^2,   dx_(k+1) = A_k dx_k + B_k du_k

@@ -1,5 +1,5 @@
-"""A motion in pieces that need not join yet, as the iterates of collocation have it, and of
-multiple shooting to come."""
+"""A motion in pieces that need not join yet, as the iterates of collocation and multiple shooting
+have it."""
 
 from dataclasses import dataclass
 

@@ -5,6 +5,7 @@ import pytest
 
 from labs.optimal_control.single_shooting.lab import REST_STEPS, SingleShootingLab
 from labs.optimal_control.single_shooting.params import SingleShootingParams
+from labs.optimal_control.single_shooting.picture import STRIPS
 from labs.optimal_control.single_shooting.plan import held_where_diverged, state_at
 from labs.scene import NullScene
 from tests.labs.optimal_control.single_shooting.simulation import (
@@ -130,7 +131,7 @@ def test_the_ball_chooses_a_control_and_its_change() -> None:
     world.lab.draw(scene, world.params, world.state)
     assert {"robot", "ghost", "plan", "changed", "fan 1", "control"} <= set(scene.names)
     lab, at = SingleShootingLab(), SingleShootingParams()
-    _, y, z = at.task.strip
+    _, y, z = STRIPS[at.task.motion]
     assert lab.edit(at, "control", (0.0, y + 0.01, z + 0.12)) == {"piece": 1.0, "delta": 1.0}
     assert lab.edit(at, "control", (0.0, y + 0.79, z - 0.06)) == {"piece": 20.0, "delta": -0.5}
     assert lab.edit(at, "control", (0.0, 9.0, 9.0)) == {"piece": 20.0, "delta": 2.0}

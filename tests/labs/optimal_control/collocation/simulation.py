@@ -2,31 +2,20 @@
 
 from collections.abc import Mapping
 
-import numpy as np
-
-from labs.engine.catalog import find
 from labs.engine.events import Event
 from labs.engine.headless import run
 from labs.engine.run import World
 from labs.optimal_control.collocation.lab import CollocationState
 from labs.optimal_control.collocation.params import CollocationParams
-from labs.params import Value
-
-Settings = Mapping[str, Value]
+from tests.labs.solving import Settings as Settings
+from tests.labs.solving import done as done
+from tests.labs.solving import readouts as tiles
+from tests.labs.solving import solve as solve
+from tests.labs.solving import solved_world
 
 
 def solved(setting: Settings) -> World:
-    world = World(find("collocation"), setting)
-    solve(world)
-    return world
-
-
-def solve(world: World) -> int:
-    """To the end; how many iterations it took."""
-    while world.solving:
-        world.iterate()
-    assert world.latest is not None
-    return world.latest.iteration
+    return solved_world("collocation", setting)
 
 
 def state(world: World) -> CollocationState:
@@ -39,13 +28,6 @@ def params(world: World) -> CollocationParams:
     return world.params
 
 
-def done(world: World) -> str:
-    assert world.latest is not None
-    return world.latest.done
-
-
 def readouts(setting: Settings, seconds: float, *events: Event) -> Mapping[str, float]:
     """What the page shows when the motion has been played once."""
-    world = run("collocation", setting, seconds=seconds, events=events)
-    channels = world.lab.measure(world.params, world.state)
-    return {name: float(value) for name, value in channels.items() if np.ndim(value) == 0}
+    return tiles(run("collocation", setting, seconds=seconds, events=events))

@@ -2,31 +2,21 @@
 
 from collections.abc import Mapping
 
-import numpy as np
-
-from labs.engine.catalog import find
 from labs.engine.events import Event
 from labs.engine.headless import run
 from labs.engine.run import World
 from labs.optimal_control.ddp.lab import DdpState
-from labs.params import Value
+from tests.labs.solving import Settings as Settings
+from tests.labs.solving import done as done
+from tests.labs.solving import readouts as tiles
+from tests.labs.solving import solve as solve
+from tests.labs.solving import solved_world
 
-Settings = Mapping[str, Value]
 UR5: Settings = {"system": "ur5", "horizon": 1.0, "goal": 3000.0}
 
 
 def solved(setting: Settings) -> World:
-    world = World(find("ddp"), setting)
-    solve(world)
-    return world
-
-
-def solve(world: World) -> int:
-    """To the end; how many iterations it took."""
-    while world.solving:
-        world.iterate()
-    assert world.latest is not None
-    return world.latest.iteration
+    return solved_world("ddp", setting)
 
 
 def state(world: World) -> DdpState:
@@ -34,13 +24,6 @@ def state(world: World) -> DdpState:
     return world.state
 
 
-def done(world: World) -> str:
-    assert world.latest is not None
-    return world.latest.done
-
-
 def readouts(setting: Settings, seconds: float, *events: Event) -> Mapping[str, float]:
     """What the page shows when the motion has been played once."""
-    world = run("ddp", setting, seconds=seconds, events=events)
-    channels = world.lab.measure(world.params, world.state)
-    return {name: float(value) for name, value in channels.items() if np.ndim(value) == 0}
+    return tiles(run("ddp", setting, seconds=seconds, events=events))

@@ -1,23 +1,17 @@
 """Races of the lab direct-methods, run to their end."""
 
-from collections.abc import Mapping
-
-from labs.engine.catalog import find
 from labs.engine.headless import run
 from labs.engine.run import World
 from labs.optimal_control.direct_methods.lab import DirectMethodsState
 from labs.optimal_control.direct_methods.race import Race
-from labs.params import Value
+from tests.labs.solving import Settings as Settings
+from tests.labs.solving import solved_world
 
-Settings = Mapping[str, Value]
 NAMES = ("single", "multiple", "collocation")
 
 
 def solved(setting: Settings) -> World:
-    world = World(find("direct-methods"), setting)
-    while world.solving:
-        world.iterate()
-    return world
+    return solved_world("direct-methods", setting)
 
 
 def race(setting: Settings) -> Race:

@@ -1,28 +1,20 @@
 """Worlds of the lab families, solved."""
 
-from collections.abc import Mapping
-
-from labs.engine.catalog import find
 from labs.engine.run import World
 from labs.optimal_control.families.lab import FamiliesState
 from labs.optimal_control.families.params import FamiliesParams
 from labs.optimal_control.families.side_by_side import Results
-from labs.params import Value
+from tests.labs.solving import Settings as Settings
+from tests.labs.solving import done as done
+from tests.labs.solving import solve as solve
+from tests.labs.solving import solved_world
 
-Settings = Mapping[str, Value]
 COARSE: Settings = {"nodes": 41.0, "hjb_steps": 20.0, "start": "cold"}
 """Where the tables do not matter."""
 
 
 def solved(setting: Settings) -> World:
-    world = World(find("families"), setting)
-    solve(world)
-    return world
-
-
-def solve(world: World) -> None:
-    while world.solving:
-        world.iterate()
+    return solved_world("families", setting)
 
 
 def results(world: World) -> Results:
@@ -41,8 +33,3 @@ def measured(world: World) -> dict[str, float]:
 
 def costs(world: World) -> dict[str, float]:
     return {name: motion.cost for name, motion in results(world).motions.items()}
-
-
-def done(world: World) -> str:
-    assert world.latest is not None
-    return world.latest.done

@@ -1,7 +1,5 @@
 """What the article of the lab multiple-shooting claims, in numbers."""
 
-from collections.abc import Mapping
-
 import numpy as np
 import pytest
 
@@ -10,11 +8,10 @@ from labs.engine.run import World
 from labs.optimal_control.multiple_shooting.lab import MultipleShootingState
 from labs.params import Value
 from tests.labs.experiments import Experiments
+from tests.labs.solving import Settings, done, solved_world
 
 EXPERIMENTS = Experiments("labs.optimal_control", "multiple_shooting")
 verify = EXPERIMENTS.verify
-
-Settings = Mapping[str, Value]
 
 
 def begun(setting: Settings, **more: Value) -> tuple[World, MultipleShootingState]:
@@ -26,12 +23,9 @@ def begun(setting: Settings, **more: Value) -> tuple[World, MultipleShootingStat
 
 def solved(setting: Settings, **more: Value) -> tuple[MultipleShootingState, str]:
     """At the end of the solver, and its last sentence."""
-    world, _ = begun(setting, **more)
-    while world.solving:
-        world.iterate()
-    assert world.latest is not None
+    world = solved_world("multiple-shooting", {**setting, **more})
     assert isinstance(world.state, MultipleShootingState)
-    return world.state, world.latest.done
+    return world.state, done(world)
 
 
 def cost(state: MultipleShootingState) -> float:

@@ -9,17 +9,11 @@ from labs.optimal_control.multiple_shooting.lab import MultipleShootingState
 from labs.params import Value
 from labs.scene import NullScene
 from labs.tasks.motion.playback import FEEDBACK
+from tests.labs.solving import done, solve
 
 
 def world_of(**setting: Value) -> World:
     return World(find("multiple-shooting"), setting)
-
-
-def solve(world: World) -> str:
-    while world.solving:
-        world.iterate()
-    assert world.latest is not None
-    return world.latest.done
 
 
 def state(world: World) -> MultipleShootingState:
@@ -36,7 +30,8 @@ def drawn(world: World) -> list[str]:
 def test_arcs_are_drawn_apart_until_they_join() -> None:
     world = world_of(segments=7.0)
     assert [f"gap {i}" in drawn(world) for i in range(1, 8)] == [True] * 6 + [False]
-    assert solve(world).startswith("Converged")
+    solve(world)
+    assert done(world).startswith("Converged")
     names = drawn(world)
     assert not [name for name in names if name.startswith("gap")]
     assert {f"segment {i}" for i in range(1, 8)} | {f"start {i}" for i in range(1, 8)} < set(names)
@@ -62,7 +57,8 @@ def test_a_change_starts_warm_where_it_is_wanted() -> None:
     world = world_of(start="warm")
     solve(world)
     world.change({"segments": 20.0})
-    assert solve(world).startswith("Converged")
+    solve(world)
+    assert done(world).startswith("Converged")
     assert state(world).history.iterations <= 3
     assert state(world).history.gaps[0].max() < 0.5, "from the motion it had"
 
@@ -71,7 +67,8 @@ def test_a_reach_goes_to_the_dragged_target_around_the_ball() -> None:
     world = world_of(system="ur5", horizon=1.0, obstacle=True)
     target = (0.45, -0.25, 0.3)
     world.change(world.lab.edit(world.params, "target", target))
-    assert solve(world).startswith("Converged")
+    solve(world)
+    assert done(world).startswith("Converged")
     at = state(world)
     tips = at.history.tips[-1].reshape(-1, 3)
     np.testing.assert_allclose(tips[-1], target, atol=1e-3)
@@ -82,9 +79,11 @@ def test_a_reach_goes_to_the_dragged_target_around_the_ball() -> None:
 
 def test_an_infeasible_limit_says_so_and_the_next_change_recovers() -> None:
     world = world_of(limited=True, limit=0.2)
-    assert solve(world).startswith("Infeasible")
+    solve(world)
+    assert done(world).startswith("Infeasible")
     assert state(world).failed
     world.change({"limited": False})
-    assert solve(world).startswith("Converged")
+    solve(world)
+    assert done(world).startswith("Converged")
     assert not state(world).failed
     assert state(world).history.gaps[-1].max() == pytest.approx(0.0, abs=1e-7)

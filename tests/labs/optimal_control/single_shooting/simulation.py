@@ -4,27 +4,18 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labs.engine.catalog import find
 from labs.engine.run import World
 from labs.optimal_control.single_shooting.lab import SingleShootingState
 from labs.optimal_control.single_shooting.params import SingleShootingParams
-from labs.params import Value
-
-Settings = Mapping[str, Value]
+from tests.labs.solving import Settings as Settings
+from tests.labs.solving import done as done
+from tests.labs.solving import readouts as readouts
+from tests.labs.solving import solve as solve
+from tests.labs.solving import solved_world
 
 
 def solved(setting: Settings) -> World:
-    world = World(find("single-shooting"), setting)
-    solve(world)
-    return world
-
-
-def solve(world: World) -> int:
-    """To the end; how many iterations it took."""
-    while world.solving:
-        world.iterate()
-    assert world.latest is not None
-    return world.latest.iteration
+    return solved_world("single-shooting", setting)
 
 
 def state(world: World) -> SingleShootingState:
@@ -37,16 +28,5 @@ def params(world: World) -> SingleShootingParams:
     return world.params
 
 
-def done(world: World) -> str:
-    assert world.latest is not None
-    return world.latest.done
-
-
 def fields(world: World) -> Mapping[str, np.ndarray]:
     return world.lab.fields(world.params, world.state)
-
-
-def readouts(world: World) -> Mapping[str, float]:
-    """What the tiles show."""
-    channels = world.lab.measure(world.params, world.state)
-    return {name: float(value) for name, value in channels.items() if np.ndim(value) == 0}

@@ -1,0 +1,38 @@
+"""Worlds whose solver runs to its end."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from labs.engine.catalog import find
+from labs.engine.run import World
+from labs.params import Value
+
+Settings = Mapping[str, Value]
+
+
+def solved_world(slug: str, setting: Settings) -> World:
+    """Of the lab of this name."""
+    world = World(find(slug), setting)
+    solve(world)
+    return world
+
+
+def solve(world: World) -> int:
+    """To the end; how many iterations it took."""
+    while world.solving:
+        world.iterate()
+    assert world.latest is not None
+    return world.latest.iteration
+
+
+def done(world: World) -> str:
+    """Why the solver stopped."""
+    assert world.latest is not None
+    return world.latest.done
+
+
+def readouts(world: World) -> Mapping[str, float]:
+    """What the tiles show."""
+    channels = world.lab.measure(world.params, world.state)
+    return {name: float(value) for name, value in channels.items() if np.ndim(value) == 0}

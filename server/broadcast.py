@@ -62,11 +62,14 @@ class Broadcast:
         """State and parameters of the last row that was sent."""
         self._status_sent, self._status_shown = 0.0, world.shown
         self._urgent = False
+        self._rows_before = 0
+        """Rows recorded when something was changed: later ones show its effect."""
         self._lateness = 0.0
 
     def request_update(self) -> None:
         """Something was changed: its effect is due now, not at the next beat."""
         self._urgent = True
+        self._rows_before = self._world.recorder.count
         self._due["status"] = 0.0
 
     def next_wake(self, now: float) -> float:
@@ -84,9 +87,9 @@ class Broadcast:
         """A greeting where a run began, and new samples if they are due."""
         if self._world.runs != self._sent_run:
             self._sent_run, self._sent_rows = self._world.runs, 0
-            self._urgent = True
+            self._urgent, self._rows_before = True, 0
             self.send_hello()
-        fresh = self._world.recorder.count > self._sent_rows or not self._controls.moving
+        fresh = self._world.recorder.count > self._rows_before or not self._controls.moving
         if self._urgent and fresh:
             self._due["telemetry"] = self._due["fields"] = self._due["scene"] = 0.0
             self._urgent = False
@@ -103,7 +106,7 @@ class Broadcast:
         """The status, twice a second and when the solver has come on."""
         if self._world.shown is not self._status_shown:
             self._due["status"] = min(self._due["status"], self._status_sent + SOLVER_EVERY)
-        if self._is_due("status", now, STATUS_EVERY):
+        if now >= self._due["status"]:
             self.send_status(now)
 
     def send_hello(self) -> None:
@@ -132,6 +135,7 @@ class Broadcast:
         )
         self._link.send(STATUS, status.model_dump())
         self._status_sent, self._status_shown = now, world.shown
+        self._due["status"] = now + STATUS_EVERY
 
     def _is_due(self, what: str, now: float, every: float) -> bool:
         if now < self._due[what]:

@@ -86,11 +86,11 @@ class LiveSession:
             self.panel.show(self.world.params)  # puts a refused value back
         except Exception as broken:
             error = self._fail(broken)
+        self.broadcast.request_update()
         if item.ref is not None:
             # The status goes first: who has the answer finds the session as it is now.
             self.broadcast.send_status(time.perf_counter())
             self.link.send(CONTROL, {"ref": item.ref, "answer": answer, "error": error})
-        self.broadcast.request_update()
 
     def _do_params(self, changes: dict[str, Any]) -> dict[str, Any]:
         runs = self.world.runs

@@ -117,6 +117,7 @@ def _bare_telemetry(session: Opened) -> list[float]:
             end = time.perf_counter() + PAUSE + 0.001 * (k % 37)
             last = stream.next("telemetry", lambda m: m["rows"] and time.perf_counter() > end)  # noqa: B023
             before = last["rows"][-1][reference]
+            time.sleep(0.001 * (7 * k % 33))  # telemetry is thirty a second: not in step with it
             begin = time.perf_counter()
             _set(stream.socket, amplitude=0.1 if k % 2 else 0.3)
             stream.next("telemetry", lambda m: _moved(m["rows"], reference, before))  # noqa: B023

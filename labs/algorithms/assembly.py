@@ -37,8 +37,11 @@ class Assembly:
 
     def matrix(self, sources: np.ndarray) -> csc_array:
         """With the values of these sources, (number of sources,). Zeros are stored as well."""
-        data = self._coefficients @ sources
-        return csc_array((data, self._indices, self._indptr), shape=self.shape)
+        return csc_array((self.values(sources), self._indices, self._indptr), shape=self.shape)
+
+    def values(self, sources: np.ndarray) -> np.ndarray:
+        """The stored entries alone, in the order of the matrix's data."""
+        return np.asarray(self._coefficients @ sources)
 
 
 def block_terms(

@@ -110,7 +110,7 @@ def _expanded(program: NonlinearProgram, options: Options, at: Iterate) -> Resum
     largest = max(at.largest_gradient, float(np.abs(d.f_y).max(initial=0.0)))
     found = optimality(program, at.y, at.values, d, at.lam, at.mu, largest)
     at = replace(at, derivatives=d, optimality=found, nu=found.nu, largest_gradient=largest)
-    if max(found.residual, found.violation) <= options.tolerance:
+    if max(found.residual, found.violation) <= options.tolerance and not at.loose:
         return replace(at, converged=True, stopped=_convergence_message(at))
     if options.hessian == "bfgs" and at.learnt is None:
         f_yy = yield from program.hessian(at.y, at.lam, at.mu, exact=False)
@@ -121,16 +121,16 @@ def _expanded(program: NonlinearProgram, options: Options, at: Iterate) -> Resum
 def _stop_short(program: NonlinearProgram, options: Options, before: Iterate, at: Iterate) -> str:
     """Why to stop here without convergence, if there is a reason."""
     assert at.optimality
-    where = f"KKT residual {at.optimality.residual:.1e}; {worst_violation(program, at.values)}"
     change = float((np.abs(at.y - before.y) / (1.0 + np.abs(at.y))).max(initial=0.0))
-    if at.alpha == 1.0 and change < STALLED and not at.penalty:
+    stalled = at.alpha == 1.0 and change < STALLED and not at.penalty
+    if not stalled and at.iteration < options.iterations:
+        return ""
+    where = f"KKT residual {at.optimality.residual:.1e}; {worst_violation(program, at.values)}"
+    if stalled:
         return f"Stopped short: steps have become too small to be told from rounding, {where}."
-    if at.iteration >= options.iterations:
-        return (
-            f"Stopped short after {at.iteration} iterations: {where}. Solve again from here to "
-            "go on."
-        )
-    return ""
+    return (
+        f"Stopped short after {at.iteration} iterations: {where}. Solve again from here to go on."
+    )
 
 
 def _convergence_message(at: Iterate) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from labs.algorithms.sqp_bfgs import Learnt
 from labs.algorithms.sqp_filter import Filter
 from labs.algorithms.sqp_optimality import Optimality
+from labs.algorithms.sqp_qp_solver import QpSolver
 from labs.errors import LabError
 from labs.problems.nonlinear_program import Derivatives, Values
 
@@ -93,6 +94,10 @@ class Iterate:
     """At y."""
     learnt: Learnt | None = None
     """BFGS's Hessian."""
+    loose: bool = False
+    """Whether the last QP was not solved wholly: then it takes another one to converge."""
+    solver: QpSolver = field(default_factory=QpSolver)
+    """What the QPs are solved with, which remembers their structure."""
     largest_gradient: float = 0.0
     """The largest |f_y| met so far."""
 

@@ -23,10 +23,10 @@ from labs.algorithms.sqp_iterate import Iterate, Options
 from labs.algorithms.sqp_merit import descend
 from labs.algorithms.sqp_optimality import worst_violation
 from labs.algorithms.sqp_subproblem import (
+    TOLERANCE,
     Answer,
     Subproblem,
     Unsolved,
-    is_staged,
     least_violation,
     solve_elastic,
     solve_subproblem,
@@ -42,8 +42,13 @@ PENALTY_FACTOR, PENALTY_LIMIT, RAISES = 10.0, 1e9, 3
 """By what gamma grows; the most it may be in parts of the size of f_y; how often in a step."""
 LARGEST_MULTIPLIER = 1e7
 """In parts of the size of f_y; where larger ones are needed, constraints may not be met at all."""
+LOOSEST = 1e-2
+"""Tolerance of a QP."""
 SHORT = 0.02
 """After a step of less, constraints seem to stand in the way: the next is an elastic one."""
+LARGEST_TIME_CHANGE = 0.3
+"""In parts of a free final time, by a step. It multiplies all of the dynamics: a model that is
+linear in it would leap to its least value, from where few problems are solved."""
 LARGEST_STEP = 1.0
 """In a look at what would lower the violation: of 1 and the size of a variable together."""
 FIRST_DAMPING, DAMPING_FACTOR, NEGLIGIBLE = 1e-3, 4.0, 1e-6
@@ -66,6 +71,7 @@ def moved(
     H, f_yy = yield from timed(_hessians(program, options, at), seconds, "derivatives")
     unit = max(at.largest_gradient, float(np.median(f_yy.diagonal()))) or 1.0
     shares = SHARES if options.hessian == "exact" else SHARES[:1]
+    tolerance = _qp_tolerance(options, at)
     for most in shares:
         begun = perf_counter()
         found: Convex | None = Convex(H)
@@ -77,15 +83,16 @@ def moved(
             return replace(at, alpha=0.0, stopped=NOT_CONVEX)
         convex = found
         qp = _subproblem(program, at, convex.P, unit)
-        answer = None if at.penalty else solve_subproblem(qp)
+        answer = None if at.penalty else solve_subproblem(qp, at.solver, tolerance)
         seconds["QP"] += perf_counter() - begun
         yield
         if not isinstance(answer, Unsolved) or answer.infeasible:
             break
-    at = replace(at, delta=convex.delta, theta=convex.theta)
+    loose = not at.penalty and tolerance > TOLERANCE
+    at = replace(at, delta=convex.delta, theta=convex.theta, loose=loose)
     most = LARGEST_MULTIPLIER * qp.unit
     if isinstance(answer, Answer) and _largest(answer) <= most:
-        again, slope = _corrections(options, qp, None), float(qp.q @ answer.p)
+        again, slope = _corrections(options, at, qp, None), float(qp.q @ answer.p)
         looking = search(program, at.y, at.values, answer.p, slope, at.filter, again)
         end = yield from timed(looking, seconds, "line search")
         if end.trial:
@@ -108,7 +115,8 @@ def _elastic(
     """After a step in elastic mode."""
     assert at.optimality
     begun, diverged = perf_counter(), False
-    theta, least = violation(at.values), least_violation(qp, LARGEST_STEP * (1.0 + np.abs(at.y)))
+    theta = violation(at.values)
+    least = least_violation(qp, LARGEST_STEP * (1.0 + np.abs(at.y)), at.solver)
     missed = at.optimality.violation > options.tolerance
     at = replace(at, elastic=(*at.elastic, theta)[-PATIENCE - 1 :])
     if missed:
@@ -127,7 +135,7 @@ def _elastic(
         begun = perf_counter()
         answer: Answer | Unsolved = Unsolved(infeasible=False)
         for _ in range(RAISES + 1):
-            answer = solve_elastic(_missing(qp, model, damping * gamma), gamma)
+            answer = solve_elastic(_missing(qp, model, damping * gamma), gamma, at.solver)
             if isinstance(answer, Unsolved) or least is None or gamma >= limit:
                 break
             gain, p = theta - answer.excess, answer.p
@@ -145,7 +153,7 @@ def _elastic(
         slope = float(qp.q @ answer.p) + gamma * (answer.excess - theta)
         if slope >= 0.0:
             continue
-        again = _corrections(options, _missing(qp, model, damping * gamma), gamma)
+        again = _corrections(options, at, _missing(qp, model, damping * gamma), gamma)
         looking = descend(program, at.y, at.values, answer.p, slope, gamma, at.filter, again)
         found = yield from timed(looking, seconds, "line search")
         diverged = found.diverged
@@ -180,6 +188,18 @@ def _damping(damping: float, p: np.ndarray, alpha: float, theta: float) -> float
     return max(DAMPING_FACTOR * damping, 0.1 * needed)
 
 
+def _qp_tolerance(options: Options, at: Iterate) -> float:
+    """How well the QP is to be solved: wholly; but by Gauss-Newton, whose steps are no better than
+    their model, far from a solution better than what a step from there can leave, which is the
+    square of what the conditions are missed by. The first QP is solved wholly: if the programme is
+    quadratic, it is the last. So is one after a point that looks like a solution."""
+    assert at.optimality
+    missed = max(at.optimality.residual, at.optimality.violation)
+    if options.hessian != "gauss-newton" or at.iteration == 0 or missed <= options.tolerance:
+        return TOLERANCE
+    return float(np.clip(0.1 * missed**2, TOLERANCE, LOOSEST))
+
+
 def _largest(of: Answer | Iterate) -> float:
     """Of its multipliers."""
     return float(max(np.abs(of.lam).max(initial=0.0), of.mu.max(initial=0.0)))
@@ -202,13 +222,15 @@ def _hessians(
 def _subproblem(program: NonlinearProgram, at: Iterate, P: csc_array, unit: float) -> Subproblem:
     assert at.derivatives
     f_y, c_y, g_y = at.derivatives
-    c, g, staged = at.values.c, at.values.g, is_staged(P)
     lower, upper = program.lower - at.y, program.upper - at.y
-    return Subproblem(P, f_y, c_y, -c, g_y, -g, lower, upper, staged, unit)
+    if program.free_time:
+        lower[-1] = max(lower[-1], -LARGEST_TIME_CHANGE * at.y[-1])
+        upper[-1] = min(upper[-1], LARGEST_TIME_CHANGE * at.y[-1])
+    return Subproblem(P, f_y, c_y, -at.values.c, g_y, -at.values.g, lower, upper, unit)
 
 
 def _corrections(
-    options: Options, qp: Subproblem, gamma: float | None
+    options: Options, at: Iterate, qp: Subproblem, gamma: float | None
 ) -> Callable[[np.ndarray, Values], np.ndarray | None]:
     """What makes of a step p, and the values at its end, the step that the curvature seen there
     asks for: c(y + p) - c_y p stands for c."""
@@ -217,7 +239,11 @@ def _corrections(
         if not options.correction:
             return None
         bent = qp._replace(b=qp.A @ p - end.c, h=qp.G @ p - end.g)
-        answer = solve_subproblem(bent) if gamma is None else solve_elastic(bent, gamma)
+        answer = (
+            solve_subproblem(bent, at.solver, _qp_tolerance(options, at))
+            if gamma is None
+            else solve_elastic(bent, gamma, at.solver)
+        )
         return answer.p if isinstance(answer, Answer) else None
 
     return corrected

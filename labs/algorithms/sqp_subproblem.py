@@ -1,4 +1,4 @@
-"""The quadratic programme of an SQP iteration (notes, 2.3.1: Newton's method), by qpsolvers:
+"""The quadratic programme of an SQP iteration (notes, 2.3.1: Newton's method), by piqp:
 
     minimise p' P p / 2 + q' p   subject to   A p = b,   G p <= h,   lower <= p <= upper
 
@@ -12,20 +12,15 @@ cost the penalty gamma,
 from typing import NamedTuple
 
 import numpy as np
-import piqp
-from qpsolvers import Problem, solve_problem
-from qpsolvers.exceptions import QPError
-from scipy.sparse import csc_array, csc_matrix, diags_array, eye_array, hstack
+from scipy.sparse import csc_array, diags_array, eye_array, hstack
 
-TOLERANCE = 1e-10
-"""Of the QP's own residuals, absolute and relative."""
-MOST_ITERATIONS = 100
-"""Of the solver, which otherwise needs 10 to 30: what takes more has gone astray."""
+from labs.algorithms.sqp_qp_solver import QpSolver, QuadraticProgram
+
+TOLERANCE = 1e-11
+"""Of the QP's own residuals, absolute and relative, where it is solved wholly."""
 AT_BOUND = 1e-9
 """A step that ends so near a bound, in its units or parts of it, and pushes against it, ends
 there."""
-NARROW = 4
-"""A matrix with a band of less than one in so many variables goes stage by stage."""
 LINEAR = 1e-8
 """Curvature that stands for none."""
 
@@ -41,8 +36,6 @@ class Subproblem(NamedTuple):
     h: np.ndarray
     lower: np.ndarray
     upper: np.ndarray
-    staged: bool = False
-    """Whether the variables are in an order in which only near ones meet."""
     unit: float = 1.0
     """Of the cost: what the solver's tolerances are in parts of."""
 
@@ -65,15 +58,14 @@ class Answer(NamedTuple):
     """Sum of the slacks: by how much p misses the constraints."""
 
 
-def solve_subproblem(qp: Subproblem) -> Answer | Unsolved:
-    """By the solver that fits the order of the variables; if that fails, by the general one."""
-    answer = _solve(qp, piqp.sparse_multistage if qp.staged else piqp.sparse_ldlt)
-    if isinstance(answer, Answer) or answer.infeasible or not qp.staged:
-        return answer
-    return _solve(qp, piqp.sparse_ldlt)
+def solve_subproblem(
+    qp: Subproblem, solver: QpSolver, tolerance: float = TOLERANCE
+) -> Answer | Unsolved:
+    """To this tolerance of its residuals, absolute and relative."""
+    return _solve(qp, solver, tolerance, stages=True)
 
 
-def solve_elastic(qp: Subproblem, gamma: float) -> Answer | Unsolved:
+def solve_elastic(qp: Subproblem, gamma: float, solver: QpSolver) -> Answer | Unsolved:
     """The same in elastic mode."""
     n, m, k = len(qp.q), len(qp.b), len(qp.h)
     slacks = 2 * m + k
@@ -88,71 +80,35 @@ def solve_elastic(qp: Subproblem, gamma: float) -> Answer | Unsolved:
         G=hstack([qp.G, csc_array((k, 2 * m)), -eye_k], format="csc"),
         lower=np.concatenate([qp.lower, np.zeros(slacks)]),
         upper=np.concatenate([qp.upper, np.full(slacks, np.inf)]),
-        staged=False,
     )
-    found = _solve(wide, piqp.sparse_ldlt)
+    found = _solve(wide, solver, TOLERANCE, stages=False)
     if isinstance(found, Unsolved):
         return found
     excess = float(np.maximum(found.p[n:], 0.0).sum())
     return found._replace(p=found.p[:n], nu=found.nu[:n], excess=excess)
 
 
-def least_violation(qp: Subproblem, largest: np.ndarray) -> float | None:
+def least_violation(qp: Subproblem, largest: np.ndarray, solver: QpSolver) -> float | None:
     """The least sum of slacks that any p has with |p| <= largest (n,)."""
     small = LINEAR * diags_array(np.ones(len(qp.q)), format="csc")
     lower, upper = np.maximum(qp.lower, -largest), np.minimum(qp.upper, largest)
     free = np.zeros(len(qp.q))
     linear = qp._replace(P=csc_array(small), q=free, lower=lower, upper=upper, unit=1.0)
-    found = solve_elastic(linear, 1.0)
+    found = solve_elastic(linear, 1.0, solver)
     return None if isinstance(found, Unsolved) else found.excess
 
 
-def is_staged(P: csc_array) -> bool:
-    """Whether the variables are ordered so that only near ones meet, but for the last."""
-    n = P.shape[0]
-    filled = np.flatnonzero(np.diff(P.indptr[:-1]))
-    last = P.indptr[filled + 1] - 1
-    last = np.where((P.indices[last] == n - 1) & (last > P.indptr[filled]), last - 1, last)
-    width = int((P.indices[last] - filled)[P.indices[last] < n - 1].max(initial=0))
-    return bool(n > NARROW * width)
-
-
-def _solve(qp: Subproblem, kkt_solver: piqp.KKTSolver) -> Answer | Unsolved:
-    bounded = bool(np.isfinite(qp.lower).any() or np.isfinite(qp.upper).any())
-    problem = Problem(
-        _matrix(qp.P, 1.0 / qp.unit),
-        qp.q / qp.unit,
-        _matrix(qp.G) if len(qp.h) else None,
-        qp.h if len(qp.h) else None,
-        _matrix(qp.A) if len(qp.b) else None,
-        qp.b if len(qp.b) else None,
-        qp.lower if bounded else None,
-        qp.upper if bounded else None,
-    )
-    try:
-        found = solve_problem(
-            problem,
-            "piqp",
-            backend="sparse",
-            kkt_solver=kkt_solver,
-            eps_abs=TOLERANCE,
-            eps_rel=TOLERANCE,
-            check_duality_gap=True,
-            eps_duality_gap_abs=TOLERANCE,
-            eps_duality_gap_rel=TOLERANCE,
-            preconditioner_scale_cost=True,
-            max_iter=MOST_ITERATIONS,
-        )
-    except (QPError, RuntimeError, ValueError):
+def _solve(qp: Subproblem, solver: QpSolver, tolerance: float, stages: bool) -> Answer | Unsolved:
+    P = csc_array((qp.P.data / qp.unit, qp.P.indices, qp.P.indptr), shape=qp.P.shape)
+    scaled = QuadraticProgram(P, qp.q / qp.unit, qp.A, qp.b, qp.G, qp.h, qp.lower, qp.upper)
+    found = solver.solve(scaled, tolerance, stages)
+    if found.x is None:
+        return Unsolved(found.infeasible)
+    nu = qp.unit * found.z_bounds
+    p, lam, mu = _snapped(qp, found.x, nu), qp.unit * found.y, qp.unit * np.maximum(found.z, 0.0)
+    if not all(np.isfinite(part).all() for part in (p, lam, mu, nu)):
         return Unsolved(infeasible=False)
-    if not found.found:
-        return Unsolved(found.extras["info"].status == piqp.PIQP_PRIMAL_INFEASIBLE)
-    p, lam, mu = np.asarray(found.x), np.asarray(found.y), np.asarray(found.z)
-    nu = qp.unit * np.asarray(found.z_box) if bounded else np.zeros(len(qp.q))
-    answer = Answer(_snapped(qp, p, nu), qp.unit * lam, qp.unit * np.maximum(mu, 0.0), nu)
-    if not all(np.isfinite(part).all() for part in answer[:4]):
-        return Unsolved(infeasible=False)
-    return answer
+    return Answer(p, lam, mu, nu)
 
 
 def _snapped(qp: Subproblem, p: np.ndarray, nu: np.ndarray) -> np.ndarray:
@@ -161,12 +117,3 @@ def _snapped(qp: Subproblem, p: np.ndarray, nu: np.ndarray) -> np.ndarray:
     bound = np.where(nu > 0.0, qp.upper, qp.lower)
     with np.errstate(invalid="ignore"):
         return np.where(np.abs(p - bound) < AT_BOUND * (1.0 + np.abs(p)), bound, p)
-
-
-def _matrix(of: csc_array, factor: float = 1.0) -> csc_matrix:
-    """As qpsolvers takes it, times a factor; stored zeros would cost the solver time."""
-    found = csc_matrix((of.data * factor, of.indices, of.indptr), shape=of.shape)
-    if (found.data == 0.0).any():
-        found = csc_matrix(found, copy=True)
-        found.eliminate_zeros()
-    return found

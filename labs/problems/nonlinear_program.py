@@ -47,6 +47,11 @@ class NonlinearProgram(Protocol):
         """(n,), inf where there is none."""
         ...
 
+    @property
+    def free_time(self) -> bool:
+        """Whether the last variable is a final time, which stretches all that happens."""
+        ...
+
     def values(self, y: np.ndarray) -> Values:
         """At y (n,)."""
         ...

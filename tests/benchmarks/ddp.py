@@ -4,10 +4,6 @@ import os
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from collections.abc import Callable
-from statistics import median
-from time import perf_counter
-
 import numpy as np
 import pinocchio as pin
 
@@ -18,9 +14,9 @@ from labs.models.mechanisms import Mechanism, mechanism
 from labs.models.plant import Plant
 from labs.problems.optimal_control import OptimalControlProblem
 from labs.tasks.motion.cost import MotionCost, TipCost
+from tests.benchmarks.timing import ROUNDS, bare_calls, least_seconds
 
 PHASES = ("derivatives", "backward", "forward")
-ROUNDS = 60
 
 
 def reach(m: Mechanism, N: int, h: float = 0.01) -> tuple[OptimalControlProblem, np.ndarray]:
@@ -55,41 +51,18 @@ def chain(joints: int) -> Mechanism:
 
 
 def iteration(problem: OptimalControlProblem, U: np.ndarray) -> tuple[dict[str, float], Iterate]:
-    """Seconds of each phase, medians over the same first iteration, a full step."""
+    """Seconds of each phase, the least of many times the same first iteration, a full step."""
     options = Options()
     at = ddp.init(problem, U, options)
     found = [ddp.step(problem, options, at) for _ in range(ROUNDS)]
     assert found[0].alpha == 1.0
-    return {phase: median(f.seconds[phase] for f in found) for phase in PHASES}, found[0]
-
-
-def bare(m: Mechanism, N: int) -> float:
-    """[s] of N calls of `aba` and N of `computeABADerivatives`."""
-    model, data = m.model, m.data
-    q, v, tau = np.resize(m.arm.home, m.nq), np.zeros(m.nq), np.ones(m.nq)
-
-    def calls() -> None:
-        for _ in range(N):
-            pin.aba(model, data, q, v, tau)
-            pin.computeABADerivatives(model, data, q, v, tau)
-
-    return seconds(calls)
-
-
-def seconds(work: Callable[[], object]) -> float:
-    """Median over rounds."""
-    times = []
-    for _ in range(ROUNDS):
-        begun = perf_counter()
-        work()
-        times.append(perf_counter() - begun)
-    return median(times)
+    return {phase: min(f.seconds[phase] for f in found) for phase in PHASES}, found[0]
 
 
 def iteration_ratio() -> None:
     """UR5, N = 100, Gauss-Newton: at most 4 times its bare calls."""
     m = mechanism("ur5")
-    calls = bare(m, 100)
+    calls = bare_calls(m, 100)
     phases, _ = iteration(*reach(m, 100))
     total = sum(phases.values())
     print(f"100 aba + 100 computeABADerivatives   {calls * 1e3:7.2f} ms    1.00")
@@ -99,7 +72,7 @@ def iteration_ratio() -> None:
     options = Options()
     problem, U = reach(m, 100)
     solved = ddp.solve(problem, U, options)
-    whole = seconds(lambda: ddp.solve(problem, U, options))
+    whole = least_seconds(lambda: ddp.solve(problem, U, options))
     print(f"a reach solved: {solved.iteration} iterations, {whole * 1e3:.1f} ms")
 
 
@@ -109,7 +82,7 @@ def growth() -> None:
     for N in (50, 100, 200, 400, 800, 1600):
         phases, _ = iteration(*reach(mechanism("ur5"), N, h=1.0 / N))
         total = sum(phases.values())
-        ratio = total / bare(mechanism("ur5"), N)
+        ratio = total / bare_calls(mechanism("ur5"), N)
         print(f"{N:5} {total * 1e3:7.2f} {total / N * 1e6:11.1f} {ratio:19.2f}")
     print("joints      ms   derivatives   backward   forward   (N = 100, chain of rods)")
     for joints in range(1, 13):

@@ -21,6 +21,7 @@ speed there, and the order is 2.
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 from scipy.sparse import csc_array, diags_array
@@ -45,6 +46,7 @@ def grid(across: float, segments: int, name: str) -> np.ndarray:
 class FastestPolyline:
     """`labs.problems.nonlinear_program.NonlinearProgram` in (v_1 ... v_(N-1)) [m/s]."""
 
+    free_time: ClassVar[bool] = False
     x: np.ndarray
     """(N + 1,) [m] abscissae of the nodes, from 0 at A to B."""
     depth: float

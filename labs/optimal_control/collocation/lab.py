@@ -31,7 +31,6 @@ from labs.tasks.direct.history import History
 from labs.tasks.direct.motions import collocated_motion
 from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots
 from labs.tasks.direct.player import (
-    PERIOD,
     DirectState,
     advanced,
     dragged,
@@ -41,6 +40,7 @@ from labs.tasks.direct.player import (
 )
 from labs.tasks.direct.tracking import playable
 from labs.tasks.motion.playback import start_playback
+from labs.tasks.motion.player import PERIOD
 
 
 @dataclass(kw_only=True)
@@ -107,7 +107,8 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
         if at.stopped:
             yield Snapshot(1, _kept(state, seconds), at.stopped)
             return
-        history, structure = History.start(params, at, collocated_motion(program, at)), None
+        history = History.start(params, at, collocated_motion(program, at))
+        structure = state.structure if state.structure.variables == program.n else None
         while not at.stopped:
             at = yield from sqp.step_in_pieces(program, params.options, at)
             yield None

@@ -9,7 +9,7 @@ import numpy as np
 
 from labs.algorithms import ddp
 from labs.algorithms.ddp import Iterate
-from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
+from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot
 from labs.models.coordinates import coordinate_labels
 from labs.models.mechanisms import mechanism
 from labs.optimal_control.ddp.disturbances import apply_impulse, sample_noise
@@ -32,36 +32,30 @@ from labs.tasks.motion.playback import (
     OPEN_LOOP,
     SUBSTEP,
     Plan,
-    Playback,
     advance_playback,
     start_playback,
 )
+from labs.tasks.motion.player import (
+    PERIOD,
+    PlayerState,
+    advance_clock,
+    measured_runs,
+    play_from_start,
+)
 
-REST_STEPS = 80
-"""World steps between the end of a motion and its start anew: 0.8 s."""
 ARROW_STEPS = 30
 """World steps the arrow of a push stays."""
 
 
 @dataclass(kw_only=True)
-class DdpState(State):
+class DdpState(PlayerState):
     """The plan, how it was found, and how it is being played."""
 
-    plan: Plan
     history: History
-    failed: bool = False
-    """Whether the last solve ended without a solution."""
-    playback: Playback
-    rested: int = 0
-    """World steps since the motion ended."""
     paid: np.ndarray
     """(2,) cost of the last whole motion with feedback and in open loop; (0,) before it."""
-    missed: np.ndarray
-    """Likewise, how far the tip ended from where it should be [m]."""
     pushed: int = 0
     """World steps the arrow of a push still stays."""
-    steps: int = 0
-    """World steps done: t = steps * period."""
     key: int = 0
     """Of the noise's random numbers; their counter is `steps`."""
 
@@ -77,7 +71,7 @@ class Ddp(Lab[DdpParams, DdpState]):
         "and without its feedback gains."
     )
     Params = DdpParams
-    period = 0.01
+    period = PERIOD
     plots = PLOTS
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Weak motor": {"limited": True, "limit": 0.3, "horizon": 3.0},
@@ -138,18 +132,13 @@ class Ddp(Lab[DdpParams, DdpState]):
 
     def accept(self, params: DdpParams, state: DdpState, snapshot: Snapshot) -> DdpState:
         """Whatever is taken in is played from its start."""
-        plan: Plan = snapshot.data["plan"]
+        data = snapshot.data
         return replace(
-            state,
-            plan=plan,
-            history=snapshot.data["history"],
-            failed=snapshot.data["failed"],
-            seconds=snapshot.data["seconds"],
-            playback=start_playback(plan),
-            rested=0,
+            play_from_start(state, data["plan"], data["failed"]),
+            history=data["history"],
+            seconds=data["seconds"],
             pushed=0,
             paid=np.zeros(0),
-            missed=np.zeros(0),
         )
 
     def edit(
@@ -168,12 +157,9 @@ class Ddp(Lab[DdpParams, DdpState]):
         if state.trouble:
             return state
         plant = mechanism(params.system, params.payload, params.friction)
-        steps = state.steps + 1
-        state = replace(state, t=steps * self.period, steps=steps, pushed=max(state.pushed - 1, 0))
-        if state.playback.finished(state.plan):
-            if state.rested < REST_STEPS:
-                return replace(state, rested=state.rested + 1)
-            return replace(state, rested=0, playback=start_playback(state.plan))
+        state, plays = advance_clock(replace(state, pushed=max(state.pushed - 1, 0)))
+        if not plays:
+            return state
         playback, pushed = state.playback, state.pushed
         if "push" in inputs.actions:
             playback, pushed = apply_impulse(plant, playback, params.push), ARROW_STEPS
@@ -206,27 +192,15 @@ class Ddp(Lab[DdpParams, DdpState]):
     # What is shown ----------------------------------------------------------------------------
 
     def measure(self, params: DdpParams, state: DdpState) -> Measurement:
-        """Costs and misses of the two runs: of the last motion that came to its end."""
-        plan, playback = state.plan, state.playback
-        n, k = plan.X.shape[1] // 2, playback.clock // plan.substeps
-        planned = plan.X[k]
-        measured: dict[str, float | np.ndarray] = {
-            "q": playback.x[FEEDBACK, :n],
-            "q_open": playback.x[OPEN_LOOP, :n],
-            "q_bar": planned[:n],
-            "v": playback.x[FEEDBACK, n:],
-            "v_open": playback.x[OPEN_LOOP, n:],
-            "v_bar": planned[n:],
-            "u": playback.u[FEEDBACK],
-            "u_bar": plan.U[min(k, plan.N - 1)],
+        """The two runs, and what the last motion that came to its end cost them."""
+        found = measured_runs(state) | {
             "cost": float(state.history.cost[-1]),
             "iteration": float(len(state.history.alpha)),
         }
         for i, suffix in ((FEEDBACK, ""), (OPEN_LOOP, "_open")):
             if len(state.paid):
-                measured[f"paid{suffix}"] = float(state.paid[i])
-                measured[f"missed{suffix}"] = float(state.missed[i])
-        return measured
+                found[f"paid{suffix}"] = float(state.paid[i])
+        return found
 
     def fields(self, params: DdpParams, state: DdpState) -> Mapping[str, np.ndarray]:
         """The iterations so far, and the gains along the motion."""

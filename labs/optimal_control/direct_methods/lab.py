@@ -25,7 +25,6 @@ from labs.params import Value
 from labs.scene import Scene
 from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots
 from labs.tasks.direct.player import (
-    PERIOD,
     DirectState,
     advanced,
     dragged,
@@ -35,6 +34,7 @@ from labs.tasks.direct.player import (
 )
 from labs.tasks.direct.tracking import playable
 from labs.tasks.motion.playback import start_playback
+from labs.tasks.motion.player import PERIOD
 
 
 @dataclass(kw_only=True)

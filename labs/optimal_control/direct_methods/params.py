@@ -2,13 +2,12 @@
 
 from labs.optimal_control.direct_methods.methods import METHODS
 from labs.params import Group
-from labs.tasks.direct.params import SOLVER, WORLD, DirectParams
-from labs.tasks.direct.systems import TITLES
+from labs.tasks.direct.params import WORLD, DirectParams
+from labs.tasks.direct.plan_params import LIGHT, SOLVER
 
 MOST_PIECES, MOST_STEPS = 40, 4
 MOST_HEAVY_PIECES = 12
 """Of the UR5, whose derivatives cost more."""
-LIGHT = tuple(name for name in TITLES if name != "ur5")
 VIEWS = {"plans": "The three plans", "played": "One plan, played"}
 
 TRANSCRIPTION = Group("Transcription", effect="solve")

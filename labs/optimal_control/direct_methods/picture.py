@@ -80,7 +80,7 @@ def _draw_plan(
     tips = at.history.tips[-1]
     times = np.linspace(0.0, at.motion.T, len(tips) + 1)[:-1, None]
     times = times + np.linspace(0.0, at.motion.T / len(tips), tips.shape[1])
-    paths = tips - drawn(params, np.zeros_like(tips), times) + offset
+    paths = tips - drawn(params.task, np.zeros_like(tips), times) + offset
     for i, run in enumerate(joined(paths), 1):
         scene.trail(f"path of {name}, piece {i}", run, "warning" if at.failed else COLORS[name])
     place = np.array(layout.label) + offset

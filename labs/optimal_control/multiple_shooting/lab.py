@@ -28,9 +28,10 @@ from labs.tasks.direct.guesses import first_guess, resampled
 from labs.tasks.direct.history import History
 from labs.tasks.direct.motions import multiple_shooting_motion
 from labs.tasks.direct.picture import draw_goal, draw_now, draw_robots
-from labs.tasks.direct.player import PERIOD, DirectState, advanced, dragged, measured, replayed
+from labs.tasks.direct.player import DirectState, advanced, dragged, measured, replayed
 from labs.tasks.direct.tracking import playable
 from labs.tasks.motion.playback import start_playback
+from labs.tasks.motion.player import PERIOD
 
 
 @dataclass(kw_only=True)

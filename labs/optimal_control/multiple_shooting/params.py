@@ -6,12 +6,10 @@ from labs.algorithms.multiple_shooting import MultipleShooting
 from labs.algorithms.shooting_steps import METHODS
 from labs.params import Group
 from labs.tasks.direct.guesses import Guess
-from labs.tasks.direct.params import SOLVER, DirectParams
-from labs.tasks.direct.systems import TITLES
+from labs.tasks.direct.params import DirectParams
+from labs.tasks.direct.plan_params import LIGHT, SOLVER
 
 MOST_PIECES, MOST_STEPS = 40, 4
-LIGHT = tuple(name for name in TITLES if name != "ur5")
-"""Systems whose derivatives cost little."""
 
 SHOOTING = Group("Shooting", effect="solve")
 

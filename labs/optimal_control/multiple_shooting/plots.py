@@ -5,10 +5,10 @@ from itertools import pairwise
 import numpy as np
 
 from labs.optimal_control.multiple_shooting.anatomy import Anatomy
-from labs.optimal_control.multiple_shooting.params import LIGHT
 from labs.optimal_control.multiple_shooting.study import Study
 from labs.plots import Curves, HeatMap, Plot, Readout, Trace
 from labs.tasks.direct.history import History
+from labs.tasks.direct.plan_params import LIGHT
 from labs.tasks.direct.plots import control_played, position_played
 
 ROUNDING = 1e-12

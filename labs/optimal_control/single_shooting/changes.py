@@ -23,7 +23,7 @@ STEPS, LEAST_ENDS, MOST_ENDS = 600, 9, 31
 
 @dataclass(frozen=True, eq=False)
 class Changed:
-    """The motion with another u_k of the first motor."""
+    """The motion with another u_k of the motor that tells most."""
 
     fan: np.ndarray
     """(len(FAN), N M + 1, nx)"""
@@ -62,25 +62,27 @@ def changed_ends(name: str, plan: Plan, k: int) -> Ends:
 
 
 def _with_change(name: str, plan: Plan, k: int, change: float) -> np.ndarray:
-    """X (N M + 1, nx) with u_k + change u_0 of the first motor."""
-    u_0 = system(name).u_0
-    U = with_row(plan.U[k:], 0, plan.U[k] + change * np.eye(1, len(u_0))[0] * u_0)
+    """X (N M + 1, nx) with u_k + change u_0 of that motor."""
+    at = system(name)
+    u = plan.U[k].copy()
+    u[at.motor] += change * at.u_0[at.motor]
+    U = with_row(plan.U[k:], 0, u)
     tail = _tail(name, plan, k)
     X = tail.rollout(tail.pack(U)).X
     return np.concatenate([plan.X[: k * plan.M], held_where_diverged(X)])
 
 
 def _sensitivity(name: str, plan: Plan, k: int) -> np.ndarray:
-    """dx_j/d(u_k/u_0) (N M + 1, nx) of the first motor: none before t_k."""
-    tail = _tail(name, plan, k)
-    S = tail.sensitivities(tail.linearize(tail.pack(plan.U[k:])))[:, :, 0]
-    return np.concatenate([np.zeros((k * plan.M, tail.nx)), S * system(name).u_0[0]])
+    """dx_j/d(u_k/u_0) (N M + 1, nx) of that motor: none before t_k."""
+    tail, at = _tail(name, plan, k), system(name)
+    S = tail.sensitivities(tail.linearize(tail.pack(plan.U[k:])))[:, :, at.motor]
+    return np.concatenate([np.zeros((k * plan.M, tail.nx)), S * at.u_0[at.motor]])
 
 
 def _tail(name: str, plan: Plan, k: int) -> SingleShooting:
     """From piece k to the end, its controls free."""
     at, T = system(name), plan.T * (1.0 - k / plan.N)
     x, u = np.full(at.mechanism.nx, np.inf), np.full(at.mechanism.nu, np.inf)
-    cost = continuous_motion(at.motion, "least-energy", T).cost
+    cost = continuous_motion(at.motion, "least-energy", T, target=np.zeros(3)).cost
     problem = ContinuousProblem(at.mechanism, cost, plan.X[k * plan.M], T, -x, x, -u, u)
     return SingleShooting(problem, plan.N - k, plan.M, plan.integrator)

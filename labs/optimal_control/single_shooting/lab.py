@@ -10,7 +10,6 @@ import numpy as np
 from labs.algorithms import riccati, sqp
 from labs.algorithms.single_shooting import SingleShooting
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
-from labs.models.coordinates import coordinate_labels
 from labs.optimal_control.single_shooting.history import History
 from labs.optimal_control.single_shooting.params import SingleShootingParams
 from labs.optimal_control.single_shooting.picture import (
@@ -36,9 +35,9 @@ from labs.optimal_control.single_shooting.studies import (
 )
 from labs.params import Value
 from labs.scene import Scene
-
-REST_STEPS = 80
-"""World steps between the end of a motion and its start anew: 0.8 s."""
+from labs.tasks.direct.picture import draw_goal
+from labs.tasks.direct.player import dragged, labels_of
+from labs.tasks.motion.player import PERIOD, REST_STEPS
 
 
 @dataclass(kw_only=True)
@@ -69,7 +68,7 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
         "see sensitivities explode, and get a gradient in three ways."
     )
     Params = SingleShootingParams
-    period = 0.01
+    period = PERIOD
     plots = PLOTS
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Mass": {"system": "mass"},
@@ -77,16 +76,28 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
         "Least time": {"system": "mass", "objective": "least-time", "limit": 1.0},
         "Double pendulum": {"system": "double-pendulum", "horizon": 0.8, "guess": 0.5},
         "Cart-pole": {"system": "cart-pole"},
+        "UR5 reach": {"system": "ur5", "horizon": 1.0, "guess": 0.0, "delta": 0.1},
+        "UR5 past an obstacle": {
+            "system": "ur5",
+            "horizon": 1.0,
+            "guess": 0.0,
+            "delta": 0.0,
+            "obstacle": True,
+        },
     }
-    handles = (Handle("control", "Which control is changed, and by how much."),)
+    handles = (
+        Handle("control", "Which control is changed, and by how much."),
+        Handle("target", "The UR5's target."),
+        Handle("obstacle", "The ball that the UR5's tip must not enter."),
+    )
 
     def init(self, params: SingleShootingParams, rng: np.random.Generator) -> SingleShootingState:
-        """The first guess is the first plan; no control at all, where it diverges."""
+        """The first guess is the first plan; what holds the start, where it diverges."""
         shooting = params.shooting
         y = shooting.pack(params.first_guess(params.N))
         if not np.isfinite(shooting.cost(y)):
-            y = shooting.pack(np.zeros((params.N, shooting.nu)))
-        at = sqp.init(shooting, y, _options(params))
+            y = shooting.pack(np.tile(params.task.holding, (params.N, 1)))
+        at = sqp.init(shooting, y, params.options)
         plan = make_plan(params, shooting, at.y)
         return SingleShootingState(plan=plan, history=History.start(at, _path(params, plan)))
 
@@ -97,20 +108,20 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
     ) -> Iterator[Snapshot | None]:
         """One iteration a snapshot. A first guess that diverges leaves what there was."""
         shooting, seconds, study = params.shooting, dict[str, Any](), NO_STUDY
-        at = sqp.init(shooting, _initial_variables(params, shooting, state), _options(params))
+        at = sqp.init(shooting, _initial_variables(params, shooting, state), params.options)
         if at.stopped:
             why = at.stopped if np.isfinite(at.values.f) else _divergence(shooting, at.y)
             yield Snapshot(1, _snapshot_data(state.plan, state.history, state.study, True, {}), why)
             return
-        if params.study == "gradients":
+        if params.studied == "gradients":
             study = yield from study_gradients(params, seconds)
         history = History.start(at, _path(params, make_plan(params, shooting, at.y)))
         while not at.stopped:
-            at = yield from sqp.step_in_pieces(shooting, _options(params), at)
+            at = yield from sqp.step_in_pieces(shooting, params.options, at)
             yield None
             plan = make_plan(params, shooting, at.y)
             history = history.append(at, _path(params, plan))
-            if at.stopped and params.study == "integration":
+            if at.stopped and params.studied == "integration":
                 study = yield from study_integration(params, plan)
             failed = bool(at.stopped) and not at.converged
             data = _snapshot_data(plan, history, study, failed, seconds)
@@ -133,8 +144,10 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
     def edit(
         self, params: SingleShootingParams, handle: str, point: tuple[float, float, float]
     ) -> Mapping[str, Value]:
-        """The ball is the change of one control."""
-        return dragged_control(params, point) if handle == "control" else {}
+        """One ball is the change of one control; the others are the UR5's target and obstacle."""
+        if handle == "control":
+            return dragged_control(params, point)
+        return dragged(params, handle, point)
 
     # The world's clock ------------------------------------------------------------------------
 
@@ -163,7 +176,7 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
             "iteration": float(len(state.history.alpha)),
             "first_effect": float(plan.influence[-1, 0]),
             "integration_error": plan.integration_error,
-            "missed": float(np.linalg.norm(X[-1, :n] - params.task.goal)),
+            "missed": params.goal_error(X[-1, :n]),
             "T": plan.T,
         }
         return measured | ({"condition": plan.condition} if plan.condition else {})
@@ -180,19 +193,15 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
         )
 
     def labels(self, params: SingleShootingParams) -> Mapping[str, str | tuple[str, ...]]:
-        words = coordinate_labels(params.task.mechanism)
-        shown = words["joint"][params.task.shown]
-        name = shown if params.task.mechanism.nq > 1 and not shown.isdigit() else "angle"
-        if params.system == "mass":
-            name = "position"
-        return words | {"shown": name, "shown_unit": words["q_unit"][params.task.shown]}
+        return labels_of(params)
 
     def draw(self, scene: Scene, params: SingleShootingParams, state: SingleShootingState) -> None:
-        """The robot, its ghost under the changed control, and the paths."""
+        """The robot, its ghost under the changed control, the paths, and the goal."""
         t = self._motion_time(state)
         draw_robots(scene, params, state.plan, t)
         draw_paths(scene, params, state.plan, state.history.paths, t, state.failed)
         draw_change(scene, params)
+        draw_goal(scene, params)
 
     def _motion_time(self, state: SingleShootingState) -> float:
         """[s] since the motion began; T while it rests."""
@@ -206,11 +215,7 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
             params = SingleShootingParams(pieces=3.0, steps=1.0, hessian=hessian)
             shooting = params.shooting
             y = shooting.pack(params.first_guess(3))
-            sqp.step(shooting, _options(params), sqp.init(shooting, y, _options(params)))
-
-
-def _options(params: SingleShootingParams) -> sqp.Options:
-    return sqp.Options(hessian=params.hessian, iterations=round(params.iterations))
+            sqp.step(shooting, params.options, sqp.init(shooting, y, params.options))
 
 
 def _initial_variables(

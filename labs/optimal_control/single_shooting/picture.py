@@ -1,5 +1,5 @@
 """The motion in its scene. Time runs away from the viewer: the path of a tip is drawn as it would
-be if the world moved back at SPEED, so that motions along one circle part."""
+be if the world moved back, so that motions along one circle part."""
 
 from collections.abc import Mapping
 from functools import lru_cache
@@ -13,6 +13,8 @@ from labs.optimal_control.single_shooting.plan import Plan, state_at
 from labs.params import Value
 from labs.scene import Scene
 from labs.shapes import Vector3
+from labs.tasks.direct.history import drawn
+from labs.tasks.direct.systems import CAMERAS as TASK_CAMERAS
 from labs.tasks.direct.systems import System, system
 
 CAMERAS: Mapping[str, tuple[Vector3, Vector3]] = {
@@ -20,6 +22,7 @@ CAMERAS: Mapping[str, tuple[Vector3, Vector3]] = {
     "pendulum": ((1.5, 0.8, 1.05), (-0.1, 0.2, 0.7)),
     "double-pendulum": ((2.6, 1.4, 1.9), (-0.1, 0.3, 1.2)),
     "cart-pole": ((2.4, 0.8, 1.4), (-0.1, 0.0, 0.65)),
+    "ur5": TASK_CAMERAS["ur5"],
 }
 """By motion: where a viewer stands and what it looks at [m], so that time is seen to run back."""
 STRIPS: Mapping[str, Vector3] = {
@@ -27,10 +30,9 @@ STRIPS: Mapping[str, Vector3] = {
     "pendulum": (0.0, 0.65, 0.6),
     "double-pendulum": (0.0, 1.15, 1.0),
     "cart-pole": (0.2, -0.4, 0.12),
+    "ur5": (-0.3, 0.0, 0.5),
 }
 """Where the strip of the control's change begins [m]: beside what swings, below what slides."""
-SPEED = 0.2
-"""[m/s] along -x."""
 POINTS = 80
 """Of a path."""
 WIDTH, HEIGHT = 0.8, 0.12
@@ -73,7 +75,7 @@ def draw_paths(
     the iterations before, or the fan of what a changed control makes of it."""
     scene.trail("plan", paths[-1], "warning" if failed else "reference")
     place = params.task.mechanism.tip(state_at(plan.X, plan.T, t)[: params.task.mechanism.nq])
-    scene.sphere("now", place - np.array([SPEED * t, 0.0, 0.0]), 0.02, "reference")
+    scene.sphere("now", drawn(params.task, place, np.array(t)), 0.02, "reference")
     if params.delta == 0.0:
         for i in range(KEPT - 1):
             if np.abs(paths[i] - paths[i + 1]).max() > SAME:
@@ -108,11 +110,10 @@ def dragged_control(
 
 
 def world_line(at: System, X: np.ndarray, T: float) -> np.ndarray:
-    """(POINTS, 3) [m] of the tip along X (k + 1, nx) over T [s], moved back as time goes."""
+    """(POINTS, 3) [m] of the tip along X (k + 1, nx) over T [s], as it is drawn."""
     t = np.linspace(0.0, T, POINTS)
     tips = [at.mechanism.tip(state_at(X, T, time)[: at.mechanism.nq]) for time in t]
-    path: np.ndarray = np.array(tips) - SPEED * t[:, None] * np.array([1.0, 0.0, 0.0])
-    return path
+    return drawn(at, np.array(tips), t)
 
 
 @lru_cache(maxsize=4)

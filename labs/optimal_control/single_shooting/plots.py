@@ -166,7 +166,7 @@ def change_fields(params: SingleShootingParams, plan: Plan) -> dict[str, np.ndar
     changed = changed_motions(params.system, plan, k, params.delta)
     ends = changed_ends(params.system, plan, k)
     stairs = np.repeat(plan.U / params.task.u_0, 2, axis=0)
-    after = stairs[:, 0].copy()
+    after = stairs[:, params.task.motor].copy()
     after[2 * k : 2 * k + 2] += params.delta
     edges = np.linspace(0.0, plan.T, plan.N + 1)
     return {

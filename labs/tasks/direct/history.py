@@ -8,6 +8,7 @@ import numpy as np
 
 from labs.algorithms.sqp import Iterate
 from labs.tasks.direct.params import DirectParams
+from labs.tasks.direct.systems import System
 from labs.tasks.direct.trajectory import Trajectory
 
 KEPT = 6
@@ -71,10 +72,10 @@ class History:
         return len(self.alpha)
 
 
-def drawn(params: DirectParams, places: np.ndarray, times: np.ndarray) -> np.ndarray:
+def drawn(at: System, places: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Places (..., 3) [m] at `times` (...) [s], moved back as time goes where motions are plane."""
     shift = SPEED * times[..., None] * np.array([1.0, 0.0, 0.0])
-    return np.asarray(places - shift if params.task.planar else places)
+    return np.asarray(places - shift if at.planar else places)
 
 
 def _arcs(params: DirectParams, motion: Trajectory) -> tuple[np.ndarray, np.ndarray]:
@@ -84,4 +85,4 @@ def _arcs(params: DirectParams, motion: Trajectory) -> tuple[np.ndarray, np.ndar
     tips = np.array([[body.tip(x[: body.nq]) for x in arc] for arc in X])
     h = motion.T / motion.pieces
     times = motion.times[:-1, None] + np.linspace(0.0, h, ARC_POINTS)
-    return drawn(params, tips, times), X[:, :, [joint, body.nq + joint]]
+    return drawn(params.task, tips, times), X[:, :, [joint, body.nq + joint]]

@@ -1,104 +1,21 @@
-"""The tunables of a motion to plan by a direct method, in collocation, multiple shooting and the
-race of direct methods."""
+"""The tunables of a motion that is guessed, planned and played, in collocation, multiple shooting
+and the race of direct methods."""
 
-from dataclasses import replace
+from labs.params import Group
+from labs.tasks.direct.plan_params import SOLVER, PlanParams
 
-import numpy as np
-
-from labs.algorithms.sqp_iterate import HESSIANS, Options
-from labs.params import Group, Params
-from labs.problems.continuous_control import ContinuousProblem
-from labs.tasks.direct.systems import TITLES, System, reaching_posture, system
-from labs.tasks.motion.continuous import OBJECTIVES, MotionLimits, continuous_motion
-from labs.tasks.motion.motions import MotionWeights
-from labs.tasks.motion.tip_constraints import Ball
-
-T_LIMITS = (0.2, 6.0)
-"""[s] of a free horizon."""
-NEEDS_LIMIT = ("least-time", "fastest-end")
-"""Objectives that have no minimum without a limit of the control."""
-MAY_LIMIT = {"objective": tuple(name for name in OBJECTIVES if name not in NEEDS_LIMIT)}
-LIMITED = ({"limited": True}, {"objective": NEEDS_LIMIT})
-SOFT_WEIGHT = 100.0
-"""[1/s] of soft limits, passed by a unit."""
 GUESSES = {
     "line": "A straight line in x",
     "still": "To stay at the start",
     "controls": "Controls, integrated",
 }
 
-MOTION = Group("Motion", effect="restart")
-LIMITS = Group("Limits", effect="solve")
-COST = Group("Weights", effect="solve", when={"objective": "weighted"})
-TARGET = Group("Target", effect="solve", when={"system": "ur5"})
-OBSTACLE = Group("Obstacle", effect="solve", when={"system": "ur5", "obstacle": True})
-SOLVER = Group("Solver", effect="solve")
 WORLD = Group("World")
 
 
-class DirectParams(Params):
-    """The motion, its limits and weights, the first guess, the solver and the plant."""
+class DirectParams(PlanParams):
+    """The motion, its limits and weights, the solver, the first guess and the plant."""
 
-    system: str = MOTION.choice("pendulum", TITLES, "System", key=True)
-    """What moves: from rest to rest; all but the upright pendulum hang at first."""
-    objective: str = MOTION.choice("least-energy", OBJECTIVES, "Minimise", key=True)
-    """What is minimised. All but the weighted one end at the goal exactly."""
-    horizon: float = MOTION.knob(
-        2.0, 0.5, 4.0, "T", "s", "Horizon", step=0.1, key=True, effect="solve"
-    )
-    """How long the motion takes; in least time, the first guess of it."""
-
-    limited: bool = LIMITS.toggle(False, "Limit the control", when=MAY_LIMIT)
-    """Solve within |u| <= u_max."""
-    limit: float = LIMITS.knob(
-        0.5, 0.2, 3.0, "u_{max}/u_0", "", "Control limit", step=0.05, when=LIMITED
-    )
-    """Most that a control may be, in units of its size u_0."""
-    speed_limited: bool = LIMITS.toggle(False, "Limit the velocity")
-    """Solve within |v| <= v_max, at every joint."""
-    speed_limit: float = LIMITS.knob(
-        3.0, 0.5, 10.0, "v_{max}", "rad/s", "Velocity limit", step=0.1, when={"speed_limited": True}
-    )
-    """Most that a joint's velocity may be."""
-    soft: bool = LIMITS.toggle(
-        False, "Soft limits", when=({"speed_limited": True}, {"system": "ur5", "obstacle": True})
-    )
-    """Velocities and obstacles may be passed a little, at a price, instead of never."""
-
-    goal: float = COST.knob(300.0, 1.0, 1e4, "w_f", "1/rad²", "Goal", scale="log", key=True)
-    """Weight of the distance from the goal at the end: of the posture, or the UR5's tip."""
-    rest: float = COST.knob(10.0, 0.01, 1e3, "w_{vf}", "s²/rad²", "Rest at the end", scale="log")
-    """Weight of the velocity at the end."""
-    posture: float = COST.knob(0.1, 0.0, 10.0, "w_q", "1/(rad²·s)", "On the way", scale="log")
-    """Weight of the distance from the goal on the way; of the UR5, from where it starts."""
-    velocity: float = COST.knob(0.01, 0.0, 10.0, "w_v", "s/rad²", "Velocity", scale="log")
-    """Weight of the velocity on the way."""
-    control: float = COST.knob(1.0, 1e-3, 100.0, "w_u", "1/s", "Control", scale="log", key=True)
-    """Weight of the controls, each in units of its own size u_0."""
-
-    target_x: float = TARGET.knob(0.4, -0.8, 0.8, "p^*_x", "m", "Target x", step=0.005)
-    """Of the tip; or drag the ball in the scene."""
-    target_y: float = TARGET.knob(-0.35, -0.8, 0.8, "p^*_y", "m", "Target y", step=0.005)
-    """Of the tip; or drag the ball in the scene."""
-    target_z: float = TARGET.knob(0.25, 0.05, 1.0, "p^*_z", "m", "Target z", step=0.005)
-    """Of the tip; or drag the ball in the scene."""
-    obstacle: bool = TARGET.toggle(False, "Obstacle", key=True)
-    """A ball that the tip must not enter."""
-    obstacle_x: float = OBSTACLE.knob(0.45, -0.8, 0.8, "m_x", "m", "Its x", step=0.005)
-    """Of its centre; or drag it in the scene."""
-    obstacle_y: float = OBSTACLE.knob(-0.1, -0.8, 0.8, "m_y", "m", "Its y", step=0.005)
-    """Of its centre; or drag it in the scene."""
-    obstacle_z: float = OBSTACLE.knob(0.35, 0.05, 1.0, "m_z", "m", "Its z", step=0.005)
-    """Of its centre; or drag it in the scene."""
-    obstacle_radius: float = OBSTACLE.knob(0.1, 0.03, 0.25, "r", "m", "Its radius", step=0.005)
-    """What the tip must stay away from its centre."""
-
-    hessian: str = SOLVER.choice("exact", HESSIANS, "Hessian", key=True)
-    """Exact, by Gauss-Newton without the curvature of the dynamics, or learnt from gradients."""
-    start: str = SOLVER.choice(
-        "warm", {"warm": "Warm: the present solution", "cold": "Cold: the first guess"}, "Start"
-    )
-    """What a change of the problem is solved from."""
     guess: str = SOLVER.choice("line", GUESSES, "First guess", key=True)
     """Of the motion: what the solver begins with."""
     guess_size: float = SOLVER.knob(
@@ -109,69 +26,8 @@ class DirectParams(Params):
         0.0, 0.0, 2.0, "f_0", "Hz", "Its frequency", step=0.05, when={"guess": "controls"}
     )
     """Of the controls guessed at first; at 0 they are a constant push."""
-    iterations: float = SOLVER.knob(100.0, 1.0, 200.0, "n_{max}", "", "Most iterations", step=1.0)
-    """Before the solver stops short."""
 
     tracking: float = WORLD.knob(100.0, 1.0, 1e4, "w_{track}", "1/rad²", "Tracking", scale="log")
     """What a deviation from the plan costs the regulator that plays it, beside R = 1/u_0^2."""
     payload: float = WORLD.knob(0.0, 0.0, 3.0, "m_{load}", "kg", "Payload", step=0.01)
     """A point mass at the tip that the plan does not know of."""
-
-    @property
-    def task(self) -> System:
-        return system(self.system)
-
-    @property
-    def target(self) -> np.ndarray:
-        """p* (3,) [m] of a reach."""
-        return np.array([self.target_x, self.target_y, self.target_z])
-
-    @property
-    def ball(self) -> Ball | None:
-        """The obstacle, if there is one."""
-        if self.system != "ur5" or not self.obstacle:
-            return None
-        center = np.array([self.obstacle_x, self.obstacle_y, self.obstacle_z])
-        return Ball(center, self.obstacle_radius)
-
-    @property
-    def goal_posture(self) -> np.ndarray:
-        """q (nq,) that a straight line leads to."""
-        return reaching_posture(self.system, self.target)
-
-    @property
-    def goal_place(self) -> np.ndarray:
-        """Where the tip should end (3,) [m]."""
-        at = self.task
-        return at.mechanism.tip(at.goal) if len(at.goal) else self.target
-
-    @property
-    def bound(self) -> np.ndarray | None:
-        """(nu,) most that |u| may be."""
-        limited = self.limited or self.objective in NEEDS_LIMIT
-        return self.limit * self.task.u_0 if limited else None
-
-    @property
-    def problem(self) -> ContinuousProblem:
-        """A new one."""
-        ball = self.ball
-        limits = MotionLimits(
-            velocity=self.speed_limit if self.speed_limited else np.inf,
-            control=np.inf if self.bound is None else self.limit,
-            obstacles=(ball,) if ball else (),
-            soft_weight=SOFT_WEIGHT if self.soft and (ball or self.speed_limited) else None,
-        )
-        motion = continuous_motion(
-            self.task.motion,
-            self.objective,
-            self.horizon,
-            weights=MotionWeights(self.goal, self.rest, self.posture, self.velocity, self.control),
-            limits=limits,
-            target=None if len(self.task.goal) else self.target,
-            T_limits=T_LIMITS if self.objective == "least-time" else None,
-        )
-        return replace(motion, x0=self.task.x0)
-
-    @property
-    def options(self) -> Options:
-        return Options(hessian=self.hessian, iterations=round(self.iterations))

@@ -6,6 +6,7 @@ import numpy as np
 from labs.scene import Color, Scene
 from labs.tasks.direct.history import KEPT, History, drawn
 from labs.tasks.direct.params import DirectParams
+from labs.tasks.direct.plan_params import PlanParams
 from labs.tasks.direct.player import DirectState
 from labs.tasks.motion.playback import FEEDBACK, OPEN_LOOP
 
@@ -38,7 +39,7 @@ def draw_robots(scene: Scene, params: DirectParams, state: DirectState) -> None:
         scene.label("of open loop", "open loop", tips[OPEN_LOOP])
 
 
-def draw_goal(scene: Scene, params: DirectParams) -> None:
+def draw_goal(scene: Scene, params: PlanParams) -> None:
     """Where the tip should end, and the ball it must stay out of."""
     if len(params.task.goal):
         scene.sphere("goal", params.goal_place, 0.025, "reference")
@@ -76,7 +77,7 @@ def draw_now(scene: Scene, params: DirectParams, state: DirectState) -> None:
     plan, body = state.plan, params.task.mechanism
     k = min(state.playback.clock // plan.substeps, plan.N)
     place = body.tip(plan.X[k, : body.nq])
-    scene.sphere("now", drawn(params, place, np.array(k * plan.h)), 0.02, color)
+    scene.sphere("now", drawn(params.task, place, np.array(k * plan.h)), 0.02, color)
 
 
 def _draw_kinks(scene: Scene, params: DirectParams, state: DirectState) -> None:
@@ -89,7 +90,7 @@ def _draw_kinks(scene: Scene, params: DirectParams, state: DirectState) -> None:
     jumps = np.array([body.tip_jacobian(x[:n]) @ gap for x, gap in zip(X, gaps, strict=True)])
     large = np.linalg.norm(jumps, axis=1) > KINK
     tips = np.array([body.tip(x[:n]) for x in X[large]]).reshape(-1, 3)
-    starts = drawn(params, tips, motion.times[1:][large])
+    starts = drawn(params.task, tips, motion.times[1:][large])
     scene.arrows("velocity gaps", starts, starts + ARROW * jumps[large])
 
 

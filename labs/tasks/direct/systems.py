@@ -54,6 +54,12 @@ class System:
     """The joint that tells most."""
 
     @property
+    def motor(self) -> int:
+        """Which control tells most: of the joint that does, if it is driven."""
+        driven = self.mechanism.driven
+        return driven.index(self.shown) if self.shown in driven else 0
+
+    @property
     def camera(self) -> tuple[Vector3, Vector3]:
         return CAMERAS[self.motion]
 

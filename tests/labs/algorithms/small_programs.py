@@ -16,6 +16,8 @@ from labs.resumable import Resumable
 class SmallProgram:
     """f, c = 0, g <= 0 as functions of the symbols y; f is of the size of a unit."""
 
+    free_time = False
+
     def __init__(
         self,
         n: int,

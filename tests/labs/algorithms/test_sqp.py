@@ -12,6 +12,7 @@ from labs.algorithms import sqp
 from labs.algorithms.sqp import Options
 from labs.algorithms.sqp_bfgs import LARGEST_GROUP, first
 from labs.algorithms.sqp_convexity import convexify, is_positive_definite
+from labs.algorithms.sqp_qp_solver import QpSolver
 from labs.algorithms.sqp_subproblem import (
     Answer,
     Subproblem,
@@ -227,7 +228,7 @@ def test_a_hessian_convex_along_the_constraints_is_made_convex_without_bending_t
     q, none = np.array([0.3, -1.0, 2.0]), np.full(3, np.inf)
     G = csc_array((0, 3))
     qp = Subproblem(convex.P, q, A, np.array([0.7]), G, np.zeros(0), -none, none)
-    found = solve_subproblem(qp)
+    found = solve_subproblem(qp, QpSolver())
     assert isinstance(found, Answer)
     kkt = np.block([[H, A.toarray().T], [A.toarray(), np.zeros((1, 1))]])
     newton = np.linalg.solve(kkt, np.r_[-q, 0.7])
@@ -254,17 +255,17 @@ def test_a_quadratic_programme_without_a_point_is_known_as_such() -> None:
     qp = Subproblem(
         csc_array(np.eye(2)), np.zeros(2), A, np.array([5.0]), G, np.zeros(0), -box, box
     )
-    answer = solve_subproblem(qp)
+    answer = solve_subproblem(qp, QpSolver())
     assert isinstance(answer, Unsolved)
     assert answer.infeasible
-    assert least_violation(qp, np.full(2, 9.0)) == pytest.approx(3.0, abs=1e-6)
+    assert least_violation(qp, np.full(2, 9.0), QpSolver()) == pytest.approx(3.0, abs=1e-6)
 
 
 def test_what_the_solver_cannot_read_is_not_trusted() -> None:
     none, G = np.full(2, np.inf), csc_array((0, 2))
     P = csc_array(np.full((2, 2), np.nan))
     qp = Subproblem(P, np.zeros(2), G, np.zeros(0), G, np.zeros(0), -none, none)
-    assert isinstance(solve_subproblem(qp), Unsolved)
+    assert isinstance(solve_subproblem(qp, QpSolver()), Unsolved)
 
 
 def test_a_restart_keeps_multipliers_that_fit() -> None:

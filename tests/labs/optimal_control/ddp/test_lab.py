@@ -7,11 +7,12 @@ from labs.engine.catalog import find
 from labs.engine.events import Event
 from labs.engine.run import World
 from labs.models.mechanisms import mechanism
-from labs.optimal_control.ddp.lab import REST_STEPS, Ddp
+from labs.optimal_control.ddp.lab import Ddp
 from labs.optimal_control.ddp.params import DdpParams
 from labs.optimal_control.ddp.plots import PHASES
 from labs.scene import NullScene
 from labs.tasks.motion.playback import FEEDBACK, OPEN_LOOP
+from labs.tasks.motion.player import REST_STEPS
 from tests.labs.optimal_control.ddp.simulation import (
     UR5,
     Settings,

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from labs.optimal_control.single_shooting.lab import REST_STEPS, SingleShootingLab
+from labs.optimal_control.single_shooting.lab import SingleShootingLab
 from labs.optimal_control.single_shooting.params import SingleShootingParams
 from labs.optimal_control.single_shooting.picture import STRIPS
 from labs.optimal_control.single_shooting.plan import held_where_diverged, state_at
 from labs.scene import NullScene
+from labs.tasks.motion.player import REST_STEPS
 from tests.labs.optimal_control.single_shooting.simulation import (
     Settings,
     done,
@@ -73,6 +74,22 @@ def test_the_larger_swing_ups_arrive(preset: str) -> None:
     world = solved(SingleShootingLab.presets[preset])
     assert done(world).startswith("Converged")
     assert readouts(world)["missed"] < 0.1
+
+
+@pytest.mark.parametrize("changes", [{}, {"obstacle": True}, {"objective": "least-time"}])
+def test_the_ur5_reaches_where_its_target_is_dragged(changes: Settings) -> None:
+    world = solved({**SingleShootingLab.presets["UR5 reach"], **changes})
+    assert done(world).startswith("Converged")
+    assert readouts(world)["missed"] < 1e-3
+    scene = NullScene()
+    world.lab.draw(scene, world.params, world.state)
+    assert "target" in scene.names
+    assert ("obstacle" in scene.names) == ("obstacle" in changes)
+    assert np.isfinite(fields(world)["changed"]).all()
+    world.change(world.lab.edit(world.params, "target", (0.35, -0.25, 0.3)))
+    solve(world)
+    assert done(world).startswith("Converged")
+    assert readouts(world)["missed"] < 1e-3
 
 
 # The world's clock ----------------------------------------------------------------------------

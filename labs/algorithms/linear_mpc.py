@@ -1,0 +1,255 @@
+"""Linear MPC (notes, 2.5.1 to 2.5.3): the quadratic programme of `labs/problems/linear_mpc.py`,
+at every period from the state measured there.
+
+`condensed` has the controls alone as variables and starts warm: the fastest while N m is small.
+`sparse` has states as well, and its cost grows as N alone. Where the condensed form fails, as over
+long horizons of an unstable A, whose powers cost all digits, the sparse one is asked.
+
+With a penalty the limits of X and X_f are soft (beyond the notes): the hard problem's plan where
+its multipliers do not exceed the penalty, which is then exact, else the one that balances cost
+and excess. The limits of U are always hard.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+from typing import Literal, NamedTuple, Self
+
+import numpy as np
+
+from labs.algorithms import linear_mpc_condensed as condensed
+from labs.algorithms import linear_mpc_sparse as sparse
+from labs.algorithms.linear_mpc_condensed import INFEASIBLE, SOLVED, Condensed
+from labs.algorithms.linear_mpc_infeasible import Infeasibility, first_infeasibility
+from labs.algorithms.linear_mpc_limits import KINDS, Terms, TwoSided, sets
+from labs.algorithms.linear_mpc_sparse import Sparse
+from labs.errors import LabError
+from labs.problems.linear_mpc import LinearMpcProblem
+from labs.problems.receding_horizon import Plan
+from labs.resumable import Resumable
+
+Form = Literal["condensed", "sparse"]
+TERMS = ("c", "x_ref", "u_ref", "q", "r", "state_margins", "control_margins")
+MET = 1e-6
+"""By how much of 1 + |h| what a solver calls solved may exceed a limit."""
+PIECE = 0.004
+"""[s] of work between two pauses of a batch."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearPlan(Plan):
+    """With what says why it is optimal, or why there is none. `cost` is without the penalty."""
+
+    multipliers: Mapping[str, np.ndarray] = field(default_factory=dict)
+    """Of each limit, shaped as `active`."""
+    infeasibility: Infeasibility | None = None
+    """The first step and limit that cannot be met."""
+
+
+class Values(NamedTuple):
+    """V*_N and the control of many states."""
+
+    V: np.ndarray
+    """(k,) NaN where the problem is infeasible."""
+    u: np.ndarray
+    """(k, m) u*_0, likewise."""
+
+
+class LinearPlanner:
+    """A `labs.problems.receding_horizon.Planner`. What it keeps are factorisations: a plan
+    depends on nothing that was planned before but its guess."""
+
+    def __init__(
+        self,
+        problem: LinearMpcProblem,
+        form: Form = "condensed",
+        penalty: float | None = None,
+        holds: Sequence[int] | None = None,
+    ) -> None:
+        """`holds` is move blocking (beyond the notes), in condensed form: the controls are held
+        over so many steps each. Raises LabError for a penalty that is not positive, and for
+        `holds` that do not add up to N or ask for the sparse form."""
+        if penalty is not None and not 0.0 < penalty < np.inf:
+            raise LabError(f"a penalty of {penalty}: it takes a positive number, or None: hard")
+        if holds is not None and (form == "sparse" or penalty is not None):
+            raise LabError("controls are held over several steps in condensed form, limits hard")
+        self.problem, self.form, self.penalty, self.holds = problem, form, penalty, holds
+        self._condensed: dict[int, Condensed] = {}
+        self._sparse: dict[tuple[int, bool], Sparse] = {}
+        self._condensed_data: dict[int, tuple[Terms, condensed.Data]] = {}
+        self._sparse_data: dict[tuple[int, bool], sparse.Data] = {}
+
+    def following(self, **terms: np.ndarray | None) -> Self:
+        """The same with other terms of the problem: of c, x_ref, u_ref, q, r and the margins,
+        which leave what is factorised as it is. Raises LabError for another name."""
+        if wrong := sorted(set(terms) - set(TERMS)):
+            raise LabError(f"{', '.join(wrong)} may not change; {', '.join(TERMS)} may")
+        other = type(self)(
+            replace(self.problem, **terms),  # type: ignore[arg-type]
+            self.form,
+            self.penalty,
+            self.holds,
+        )
+        other._condensed, other._sparse = self._condensed, self._sparse
+        return other
+
+    def plan(
+        self, x: np.ndarray, guess: Plan | None, N: int | None = None
+    ) -> Resumable[LinearPlan]:
+        """From x (n,), over N steps, of which fewer than the problem's are its last ones. The
+        condensed form starts from the guess's active limits."""
+        begun = perf_counter()
+        N = self.problem.N if N is None else N
+        if self.form == "condensed":
+            plan = yield from self._condensedly(x, guess, N)
+        else:
+            plan = self._sparsely(x, N, hard=True)
+        if self.penalty is not None and not (plan.found and self._is_exact(plan)):
+            yield
+            plan = self._soften(x, N, plan)
+        if not plan.found:
+            yield
+            form, _, data = yield from self._condense(N)
+            why = first_infeasibility(self.problem, form, data, x)
+            if why is not None:
+                plan = replace(plan, infeasibility=why, message=why.message(N))
+        qp = plan.seconds["QP"]
+        return replace(plan, seconds={"QP": qp, "rest": perf_counter() - begun - qp})
+
+    def values(self, X: np.ndarray) -> Resumable[Values]:
+        """Of the states X (k, n), each solved from the one before: neighbours should follow each
+        other. Limits are hard, whatever the penalty, and the form is the condensed one."""
+        form, _, data = yield from self._condense(self.problem.N)
+        V, u = np.full(len(X), np.nan), np.full((len(X), self.problem.m), np.nan)
+        active, begun = None, perf_counter()
+        for i, x in enumerate(X):
+            flag, W, rows, value, _ = form.solve(data, x, active)
+            if flag == SOLVED:
+                V[i], u[i], active = value, form.controls(W)[0], np.sign(rows)
+            elif not (flag == INFEASIBLE and form.trusted) and self.holds is None:
+                plan = self._sparsely(x, self.problem.N, hard=True)
+                V[i], u[i] = plan.cost, plan.U[0] if plan.found else np.nan
+            if perf_counter() - begun > PIECE:
+                yield
+                begun = perf_counter()
+        return Values(V, u)
+
+    # The forms ----------------------------------------------------------------------------------
+
+    def _condensedly(self, x: np.ndarray, guess: Plan | None, N: int) -> Resumable[LinearPlan]:
+        """The hard problem's plan; by the sparse form where the condensed one fails."""
+        form, terms, data = yield from self._condense(N)
+        begun = perf_counter()
+        active = None if guess is None else self._active_rows(form, guess.active)
+        flag, W, rows, _, iterations = form.solve(data, x, active)
+        seconds = perf_counter() - begun
+        U = form.controls(W)
+        multipliers = self._split(form.sides, form.by_kind(rows))
+        plan = self._made(terms, self._rollout(terms, x, U), U, multipliers, iterations, seconds)
+        if flag == SOLVED and plan.violation == 0.0:
+            return plan
+        if (flag == INFEASIBLE and form.trusted) or self.holds is not None:
+            return _not_found(plan, "Infeasible.")
+        return self._sparsely(x, N, hard=True)
+
+    def _sparsely(self, x: np.ndarray, N: int, hard: bool) -> LinearPlan:
+        """The hard or the softened problem's plan."""
+        key = N, hard
+        if key not in self._sparse:
+            self._sparse[key] = Sparse(self.problem, N, None if hard else self.penalty)
+        form, terms = self._sparse[key], Terms.of(self.problem, N)
+        if key not in self._sparse_data:
+            self._sparse_data[key] = form.data(terms)
+        begun = perf_counter()
+        found = form.solve(self._sparse_data[key], x)
+        seconds = perf_counter() - begun
+        multipliers = self._split(form.sides, found.rows)
+        plan = self._made(terms, found.X, found.U, multipliers, found.iterations, seconds)
+        if found.solved and (plan.violation == 0.0 or not hard):
+            return plan
+        return _not_found(plan, "The interior-point method found no solution.")
+
+    def _soften(self, x: np.ndarray, N: int, hard: LinearPlan) -> LinearPlan:
+        """The softened problem's plan."""
+        plan = self._sparsely(x, N, hard=False)
+        seconds = {"QP": plan.seconds["QP"] + hard.seconds["QP"]}
+        message = f"Softened: limits are exceeded by {plan.violation:.2g} in all."
+        return replace(plan, message=message if plan.found else plan.message, seconds=seconds)
+
+    def _is_exact(self, plan: LinearPlan) -> bool:
+        """Whether the hard plan solves the softened problem as well."""
+        pushes = (plan.multipliers[kind].max(initial=0.0) for kind in ("state", "terminal"))
+        return self.penalty is not None and max(pushes) <= self.penalty
+
+    def _made(
+        self,
+        terms: Terms,
+        X: np.ndarray,
+        U: np.ndarray,
+        multipliers: dict[str, np.ndarray],
+        iterations: int,
+        seconds: float,
+    ) -> LinearPlan:
+        """A plan as a solver left it, with by how much it exceeds what it should not."""
+        excess = terms.excess(self.problem, X, U)
+        slack = {kind: MET * (1.0 + np.abs(terms.h[kind])) for kind in KINDS}
+        active = {k: (multipliers[k] > 0.0) & (multipliers[k] > -excess[k]) for k in KINDS}
+        over = sum(float(excess[k][excess[k] > slack[k]].sum()) for k in KINDS)
+        finite = bool(np.isfinite(X).all() and np.isfinite(U).all())
+        return LinearPlan(
+            X=X,
+            U=U,
+            cost=terms.cost(self.problem, X, U) if finite else np.nan,
+            found=True,
+            message="Solved.",
+            active=active,
+            violation=over if finite else np.inf,
+            iterations=iterations,
+            seconds={"QP": seconds},
+            multipliers=multipliers,
+        )
+
+    def _rollout(self, terms: Terms, x: np.ndarray, U: np.ndarray) -> np.ndarray:
+        """X (N + 1, n) by the dynamics."""
+        A, X = self.problem.A, np.empty((terms.N + 1, len(x)))
+        driven = U @ self.problem.B.T + terms.c
+        X[0] = x
+        for k in range(terms.N):
+            X[k + 1] = A @ X[k] + driven[k]
+        return X
+
+    def _condense(self, N: int) -> Resumable[tuple[Condensed, Terms, condensed.Data]]:
+        """The condensed form over N steps, made once, with what this problem puts into it."""
+        if N not in self._condensed:
+            self._condensed[N] = Condensed(self.problem, N, self.holds)
+            yield
+        if N not in self._condensed_data:
+            terms = Terms.of(self.problem, N)
+            self._condensed_data[N] = terms, self._condensed[N].data(terms)
+        return self._condensed[N], *self._condensed_data[N]
+
+    def _split(
+        self, sides: Mapping[str, TwoSided], rows: Mapping[str, np.ndarray]
+    ) -> dict[str, np.ndarray]:
+        """Multipliers of the joined rows as those of the sets' own."""
+        limits = sets(self.problem)
+        return {kind: sides[kind].split(rows[kind], len(limits[kind].h)) for kind in KINDS}
+
+    def _active_rows(self, form: Condensed, active: Mapping[str, np.ndarray]) -> np.ndarray | None:
+        """The joined rows' sides (rows,), where the guess has the limits and the horizon of this
+        problem."""
+        parts, limits = [], sets(self.problem)
+        for kind in KINDS:
+            steps, size = form.shapes[kind]
+            given = active.get(kind)
+            if given is None or given.shape != (steps, len(limits[kind].h)):
+                return None
+            parts.append(form.sides[kind].join(given).reshape(steps * size))
+        return np.concatenate(parts)
+
+
+def _not_found(plan: LinearPlan, message: str) -> LinearPlan:
+    nothing: dict[str, np.ndarray] = {}
+    return replace(
+        plan, found=False, cost=np.nan, message=message, active=nothing, multipliers=nothing
+    )

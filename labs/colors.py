@@ -63,16 +63,24 @@ def sequential(
 
 def to_oklab(srgb: np.ndarray) -> np.ndarray:
     """Lightness and two opponent colours (..., 3) of sRGB colours (..., 3) in [0, 1]."""
-    linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-    return np.asarray(np.cbrt(linear @ TO_CONES.T) @ TO_LAB.T)
+    return np.asarray(np.cbrt(to_linear(srgb) @ TO_CONES.T) @ TO_LAB.T)
 
 
 def from_oklab(lab: np.ndarray) -> np.ndarray:
     """sRGB colours (..., 3) of OKLab (..., 3); what no screen shows is cut off to [0, 1]."""
     cones = (lab @ np.linalg.inv(TO_LAB).T) ** 3
-    linear = np.clip(cones @ np.linalg.inv(TO_CONES).T, 0.0, 1.0)
+    return from_linear(np.clip(cones @ np.linalg.inv(TO_CONES).T, 0.0, 1.0))
+
+
+def to_linear(srgb: np.ndarray) -> np.ndarray:
+    """Intensities (...) of light of sRGB channels (...) in [0, 1]."""
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+
+def from_linear(linear: np.ndarray) -> np.ndarray:
+    """sRGB channels (...) of intensities (...) in [0, 1]."""
     curved = 1.055 * linear ** (1.0 / 2.4) - 0.055
-    return np.asarray(np.where(linear <= 0.0031308, 12.92 * linear, curved))
+    return np.where(linear <= 0.0031308, 12.92 * linear, curved)
 
 
 @cache

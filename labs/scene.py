@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from labs.shapes import Body
+from labs.shapes import Body, Vector3
 
 Color = Literal["actual", "reference", "force", "warning", "muted"]
 
@@ -40,9 +40,9 @@ class Scene(Protocol):
     def trail(
         self, name: str, points: np.ndarray, color: Color = "actual", strength: float = 1.0
     ) -> None:
-        """A polyline through `points` (k, 3) [m]. Of a lower `strength`, in (0, 1], it is paler:
-        so that what was tried before fades behind what is tried now. A muted one may leave the
-        view; all else that is drawn is kept in it."""
+        """A polyline through `points` (k, 3) [m], or m of them, (m, k, 3). Of a lower `strength`,
+        in (0, 1], it is paler: so that what was tried before fades behind what is tried now. A
+        muted one may leave the view; all else that is drawn is kept in it."""
         ...
 
     def arrow(self, name: str, start: ArrayLike, end: ArrayLike, color: Color = "force") -> None:
@@ -113,6 +113,24 @@ class Scene(Protocol):
     ) -> None:
         """Many arrows at once, from `starts` to `ends`, both (k, 3) [m], k from 0; one of no
         length is left out. All have the same head, in proportion to the longest arrow."""
+        ...
+
+    def polygon(
+        self,
+        name: str,
+        corners: np.ndarray,
+        color: Color | Vector3 = "actual",
+        opacity: float = 1.0,
+    ) -> None:
+        """A flat convex polygon, filled, seen from both sides: `corners` (k, 3) [m] in order round
+        it, k at least 3. `color` by name, or sRGB in [0, 1]; `opacity` in (0, 1]. Of two in the
+        same plane it is not told which hides the other: leave a millimetre or two between."""
+        ...
+
+    def dots(
+        self, name: str, centers: np.ndarray, diameter: float, color: Color = "actual"
+    ) -> None:
+        """Many dots at once, at `centers` (k, 3) [m], k from 0, `diameter` [m] wide."""
         ...
 
 
@@ -188,6 +206,20 @@ class NullScene:
 
     def arrows(
         self, name: str, starts: np.ndarray, ends: np.ndarray, color: Color = "force"
+    ) -> None:
+        self.names.append(name)
+
+    def polygon(
+        self,
+        name: str,
+        corners: np.ndarray,
+        color: Color | Vector3 = "actual",
+        opacity: float = 1.0,
+    ) -> None:
+        self.names.append(name)
+
+    def dots(
+        self, name: str, centers: np.ndarray, diameter: float, color: Color = "actual"
     ) -> None:
         self.names.append(name)
 

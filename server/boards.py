@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import viser
 
+from labs.colors import to_linear
 from labs.scene import cell_centers
 from server.messages import View
 from server.nodes import Node
@@ -21,6 +22,9 @@ SURFACE_EVERY = 0.19
 """[s] Between two updates of a surface: they are long messages."""
 PREPARED = 0.12
 """[s] A viewer has to prepare a surface it was sent, before it shows it."""
+
+FLAT = 1e-6
+"""[m] So little is as good as nothing."""
 
 Clicked = Callable[[tuple[float, float, float]], None]
 
@@ -94,7 +98,7 @@ class SurfaceNode(Node):
         view: View,
     ) -> None:
         super().__init__(server.scene.add_frame(path, show_axes=False))
-        self._exposure = exposure(view)
+        self._exposure = exposure(view, points)
         data = glb(points, colors, self._exposure)
         self._shown, self._hidden = (
             server.scene.add_glb(f"{path}/{copy}", data, visible=copy == 0, cast_shadow=False)
@@ -123,10 +127,15 @@ class SurfaceNode(Node):
             self._preparing = True
 
 
-def exposure(view: View) -> float:
+def exposure(view: View, points: np.ndarray | None = None) -> float:
     """How much brighter the scene's light makes a colour (linear): a value's colour is made so
-    much darker, to be about the one its legend shows."""
-    return 1.5 if view.graphics == "low" else 2.7
+    much darker, to be about the one its legend shows. A flat thing through `points` (..., 3) that
+    stands upright along an axis has less light than what lies."""
+    lying, standing = (1.5, 0.55) if view.graphics == "low" else (2.7, 1.4)
+    if points is None:
+        return lying
+    x, y, z = np.ptp(points.reshape(-1, 3), axis=0)
+    return standing if min(x, y) < FLAT < z else lying
 
 
 def glb(points: np.ndarray, colors: np.ndarray, exposure: float) -> bytes:
@@ -135,7 +144,7 @@ def glb(points: np.ndarray, colors: np.ndarray, exposure: float) -> bytes:
     corners = points.reshape(-1, 3).astype("<f4")
     faces = _faces(*points.shape[:2])
     tints = np.full((len(corners), 4), 65535, "<u2")
-    tints[:, :3] = np.round(65535 / exposure * _linear(colors.reshape(-1, 3)))
+    tints[:, :3] = np.round(65535 * np.minimum(to_linear(colors.reshape(-1, 3)) / exposure, 1.0))
     parts = [corners.tobytes(), tints.tobytes(), faces.tobytes()]
     starts = np.cumsum([0, *map(len, parts)]).tolist()
     float32, uint16, uint32 = 5126, 5123, 5125
@@ -203,11 +212,7 @@ def _chunk(kind: bytes, data: bytes, filler: bytes) -> bytes:
 
 def _bytes(colors: np.ndarray, exposure: float) -> np.ndarray:
     """Per-instance colours as Viser takes them: linear, not sRGB."""
-    return np.round(255 / exposure * _linear(colors.reshape(-1, 3))).astype(np.uint8)
-
-
-def _linear(srgb: np.ndarray) -> np.ndarray:
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    return np.round(255 / exposure * to_linear(colors.reshape(-1, 3))).astype(np.uint8)
 
 
 def _on_plane(

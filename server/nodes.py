@@ -167,6 +167,45 @@ class ArmNode(Node):
         )
 
 
+class EllipsoidNode(Node):
+    """A translucent ball under a linear map."""
+
+    def __init__(self, server: viser.ViserServer, path: str, color: Color) -> None:
+        self._vertices, faces = meshes.ball()
+        super().__init__(
+            server.scene.add_mesh_simple(
+                path,
+                self._vertices,
+                faces,
+                color=COLORS[color],
+                opacity=0.3,
+                side="double",
+                cast_shadow=False,
+            )
+        )
+
+    def stretch(self, axes: np.ndarray) -> None:
+        """The image of the unit ball under `axes` (3, 3) [m]."""
+        self.send("vertices", (self._vertices @ axes.T).astype(np.float32))
+
+
+class DotsNode(Node):
+    """Many dots, which all face whoever looks: their places are sent as "points"."""
+
+    def __init__(self, server: viser.ViserServer, path: str, diameter: float, color: Color) -> None:
+        super().__init__(
+            server.scene.add_point_cloud(
+                path,
+                np.zeros((0, 3), np.float32),
+                COLORS[color],
+                point_size=diameter,
+                point_shape="circle",
+                precision="float32",
+                point_shading="flat",
+            )
+        )
+
+
 def _turn_z_to(axis: np.ndarray) -> np.ndarray:
     quaternion = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis)
     return np.asarray(quaternion.coeffs()[[3, 0, 1, 2]])

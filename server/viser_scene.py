@@ -4,8 +4,6 @@ An arm is a tree of nodes, one a joint, each in its parent: moving it sends one 
 and one that has not moved sends nothing. What a frame does not draw is hidden."""
 
 import math
-from collections import Counter
-from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
@@ -14,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from labs.engine.run import World
 from labs.scene import Color
-from labs.shapes import Body
+from labs.shapes import Body, Vector3
 from server import meshes
 from server.boards import CellsNode, SurfaceNode, cell_corners
 from server.camera import CORNERS, Cameras
@@ -22,7 +20,16 @@ from server.handles import HandleNode
 from server.labels import LabelNode, arrange_nodes
 from server.mailbox import Mailbox
 from server.messages import View
-from server.nodes import COLORS, ArmNode, Node, blend_with_background
+from server.node_table import NodeTable
+from server.nodes import (
+    COLORS,
+    ArmNode,
+    DotsNode,
+    EllipsoidNode,
+    Node,
+    blend_with_background,
+)
+from server.polygons import PolygonNode, padded_count
 from server.surroundings import show_surroundings
 
 TRAIL_EVERY = 3
@@ -36,12 +43,10 @@ class ViserScene:
 
     def __init__(self, server: viser.ViserServer, mailbox: Mailbox, view: View) -> None:
         self._server, self._mailbox = server, mailbox
-        self._nodes: dict[str, Node] = {}
-        self._drawn: dict[str, None] = {}  # in the order drawn
+        self._nodes = NodeTable()
         self._frame = 0
         self._shown: list[object] = []
         """The run that was drawn, and what its bodies and boards looked like."""
-        self._made: Counter[str] = Counter()
         self._cameras = Cameras(server)
         server.gui.main_panel.dock_right()
         server.gui.main_panel.minimize()  # one tap away: the page has knobs of its own
@@ -50,20 +55,18 @@ class ViserScene:
     def set_view(self, view: View) -> None:
         """Light or dark; low graphics means no environment light, no shadows, plain meshes."""
         self._view = view
-        self._clear()
+        self._nodes.clear()
+        self._frame = 0
         show_surroundings(self._server, view)
 
     def draw(self, world: World) -> None:
         """One frame of a lab, to whoever looks."""
         if not self._server.get_clients() and self._frame:
             return  # Nobody looks; the first frame is drawn for whoever comes.
-        self._drawn.clear()
         # One window a frame, sent at once: by itself Viser collects messages for 17 ms.
         with self._server.atomic():
             world.lab.draw(self, world.params, world.state)
-            for name, node in self._nodes.items():
-                node.show(name in self._drawn)
-            drawn = [self._nodes[name] for name in self._drawn]
+            drawn = self._nodes.show_drawn()
             shown = [node.appearance for node in drawn if isinstance(node, ArmNode | CellsNode)]
             held = any(node.held for node in drawn if isinstance(node, HandleNode))
             self._cameras.follow(changed=[world.runs, *shown] != self._shown, held=held)
@@ -92,7 +95,7 @@ class ViserScene:
         effort: np.ndarray | None = None,
     ) -> None:
         appearance = (id(arm), ghost)
-        node = self._node(
+        node = self._nodes.node(
             name, appearance, lambda path: ArmNode(self._server, path, arm, ghost, self._view)
         )
         assert isinstance(node, ArmNode)
@@ -106,13 +109,14 @@ class ViserScene:
     def trail(
         self, name: str, points: np.ndarray, color: Color = "actual", strength: float = 1.0
     ) -> None:
-        if len(points) < 2:
+        pairs = np.stack([points[..., :-1, :], points[..., 1:, :]], axis=-2)
+        if not pairs.size:
             return
-        segments = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
+        segments = pairs.reshape(-1, 2, 3).astype(np.float32)
         mixed = blend_with_background(color, strength, self._view.dark)
         node = self._lines(name, segments, mixed, 2.5)
         if color != "muted":
-            self._cameras.see(points)
+            self._cameras.see(points.reshape(-1, 3))
         if self._frame % TRAIL_EVERY == 0:
             node.send("points", segments)
 
@@ -126,7 +130,7 @@ class ViserScene:
         def make(path: str) -> Node:
             return Node(self._server.scene.add_icosphere(path, radius, color=COLORS[color]))
 
-        self._node(name, (radius, color), make).place(np.asarray(center))
+        self._nodes.node(name, (radius, color), make).place(np.asarray(center))
         self._cameras.see_ball(center, radius)
 
     def frame(self, name: str, placement: pin.SE3, length: float = 0.15) -> None:
@@ -137,7 +141,7 @@ class ViserScene:
                 )
             )
 
-        node = self._node(name, length, make)
+        node = self._nodes.node(name, length, make)
         node.place(placement.translation)
         node.turn(pin.SE3ToXYZQUAT(placement)[[6, 3, 4, 5]])
         self._cameras.see(placement.translation + length * placement.rotation.T)
@@ -160,23 +164,9 @@ class ViserScene:
     def ellipsoid(
         self, name: str, center: ArrayLike, axes: np.ndarray, color: Color = "actual"
     ) -> None:
-        vertices, faces = meshes.ball()
-
-        def make(path: str) -> Node:
-            return Node(
-                self._server.scene.add_mesh_simple(
-                    path,
-                    vertices @ axes.T,
-                    faces,
-                    color=COLORS[color],
-                    opacity=0.3,
-                    side="double",
-                    cast_shadow=False,
-                )
-            )
-
-        node = self._node(name, color, make)
-        node.send("vertices", (vertices @ axes.T).astype(np.float32))
+        node = self._nodes.node(name, color, lambda path: EllipsoidNode(self._server, path, color))
+        assert isinstance(node, EllipsoidNode)
+        node.stretch(axes)
         node.place(np.asarray(center))
         self._cameras.see(np.asarray(center) + np.concatenate([axes.T, -axes.T]))
 
@@ -184,7 +174,7 @@ class ViserScene:
         def make(path: str) -> Node:
             return HandleNode(self._server, path, name, radius, self._mailbox)
 
-        node = self._node(name, radius, make)
+        node = self._nodes.node(name, radius, make)
         assert isinstance(node, HandleNode)
         point = np.asarray(position, float)
         node.place(point)
@@ -193,7 +183,7 @@ class ViserScene:
         self._cameras.avoid(point + shown * CORNERS)
 
     def label(self, name: str, text: str, position: ArrayLike) -> None:
-        node = self._node(name, "label", lambda path: LabelNode(self._server, path, text))
+        node = self._nodes.node(name, "label", lambda path: LabelNode(self._server, path, text))
         assert isinstance(node, LabelNode)
         node.write(text, np.asarray(position, float))
         self._cameras.see_label(node.point, text)
@@ -217,7 +207,7 @@ class ViserScene:
             on_click = clicked if clickable else None
             return CellsNode(self._server, path, corner, size, colors, on_click, self._view)
 
-        node = self._node(name, (corner, size, colors.shape, clickable), make)
+        node = self._nodes.node(name, (corner, size, colors.shape, clickable), make)
         assert isinstance(node, CellsNode)
         node.paint(colors)
         self._cameras.see(cell_corners(corner, size, *colors.shape[:2]))
@@ -226,7 +216,7 @@ class ViserScene:
         def make(path: str) -> Node:
             return SurfaceNode(self._server, path, points, colors, self._view)
 
-        node = self._node(name, "surface", make)
+        node = self._nodes.node(name, "surface", make)
         assert isinstance(node, SurfaceNode)
         node.draw(points, colors)
         self._cameras.see(points)
@@ -246,20 +236,33 @@ class ViserScene:
         if self._frame % TRAIL_EVERY == 0:
             node.send("points", points)
 
-    # Nodes ----------------------------------------------------------------------------------
+    def polygon(
+        self,
+        name: str,
+        corners: np.ndarray,
+        color: Color | Vector3 = "actual",
+        opacity: float = 1.0,
+    ) -> None:
+        def make(path: str) -> Node:
+            return PolygonNode(self._server, path, corners, color, opacity, self._view)
 
-    def _node(self, name: str, appearance: object, make: Callable[[str], Node]) -> Node:
-        """The node of this name, made anew where it must look different; under a path of its own
-        then: a viewer may go on with the pose of a removed node of the same path."""
-        node = self._nodes.get(name)
-        if node is None or node.appearance != appearance:
-            if node is not None:
-                node.remove()
-            number, self._made[name] = self._made[name], self._made[name] + 1
-            node = self._nodes[name] = make(f"/{name}#{number}" if number else f"/{name}")
-            node.appearance = appearance
-        self._drawn[name] = None
-        return node
+        node = self._nodes.node(name, (color, opacity, padded_count(corners)), make)
+        assert isinstance(node, PolygonNode)
+        node.draw(corners)
+        self._cameras.see(corners)
+
+    def dots(
+        self, name: str, centers: np.ndarray, diameter: float, color: Color = "actual"
+    ) -> None:
+        if not len(centers):
+            return
+        node = self._nodes.node(
+            name, (diameter, color), lambda path: DotsNode(self._server, path, diameter, color)
+        )
+        node.send("points", centers.astype(np.float32))
+        self._cameras.see(centers)
+
+    # Nodes ----------------------------------------------------------------------------------
 
     def _lines(self, name: str, segments: np.ndarray, color: np.ndarray, thickness: float) -> Node:
         def make(path: str) -> Node:
@@ -269,7 +272,7 @@ class ViserScene:
                 )
             )
 
-        node = self._node(name, thickness, make)
+        node = self._nodes.node(name, thickness, make)
         node.send("colors", color)
         return node
 
@@ -286,13 +289,7 @@ class ViserScene:
                 )
             )
 
-        return self._node(name, (color, head), make)
-
-    def _clear(self) -> None:
-        for node in self._nodes.values():
-            node.remove()
-        self._nodes.clear()
-        self._frame = 0
+        return self._nodes.node(name, (color, head), make)
 
 
 def _three(point: ArrayLike) -> tuple[float, float, float]:

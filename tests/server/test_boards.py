@@ -176,6 +176,16 @@ def test_a_surface_is_replaced_only_once_the_new_one_is_there(
     assert (first.visible, second.visible) == (False, True)
 
 
+def test_what_stands_upright_is_made_less_dark_than_what_lies() -> None:
+    flat = np.stack([*np.meshgrid([0.0, 1.0], [0.0, 1.0]), np.zeros((2, 2))], axis=-1)
+    relief, _ = hills(4, 5)
+    for view in (LOW, View(graphics="high")):
+        lying = boards.exposure(view)
+        assert boards.exposure(view, flat) == boards.exposure(view, relief) == lying
+        for way in ([2, 0, 1], [1, 2, 0]):
+            assert boards.exposure(view, flat[..., way]) < lying
+
+
 # Arrows ---------------------------------------------------------------------------------------
 
 
@@ -192,7 +202,53 @@ def test_many_arrows_are_one_node_without_those_of_no_length(server: viser.Viser
     scene.arrows("policy", starts, ends)
     assert scene._nodes["policy"] is node
     assert node._handle.points.shape == (1, 2, 3)
-    scene._drawn.clear()
+    assert scene._nodes.show_drawn() == [node]
     for none in (starts, np.empty((0, 3))):
         scene.arrows("policy", none, none)
-    assert "policy" not in scene._drawn, "where there is no arrow nothing is shown"
+    assert scene._nodes.show_drawn() == [], "where there is no arrow nothing is shown"
+
+
+# Polygons and dots ----------------------------------------------------------------------------
+
+
+def test_a_polygon_keeps_its_mesh_while_it_gains_corners(server: viser.ViserServer) -> None:
+    scene = ViserScene(server, Mailbox(), LOW)
+
+    def drawn(corners: int) -> tuple[Any, float]:
+        """Its node, and the area of its triangles."""
+        angles = np.linspace(0.0, 2 * np.pi, corners, endpoint=False)
+        round_ = np.stack([np.cos(angles), np.sin(angles), np.ones(corners)], axis=1)
+        scene.polygon("set", round_, (0.2, 0.5, 0.7), 0.5)
+        node = scene._nodes["set"]
+        mesh = trimesh.Trimesh(node._handle.vertices, node._handle.faces, process=False)
+        return node, float(mesh.area)
+
+    triangle, area = drawn(3)
+    assert area == pytest.approx(3 * np.sqrt(3) / 4)
+    octagon, area = drawn(8)
+    assert octagon is triangle
+    assert area == pytest.approx(2 * np.sqrt(2))
+    more, area = drawn(9)
+    assert more is not triangle
+    assert area == pytest.approx(4.5 * np.sin(2 * np.pi / 9))
+
+
+def test_many_dots_and_many_lines_are_one_node_each(server: viser.ViserServer) -> None:
+    scene = ViserScene(server, Mailbox(), LOW)
+    places = np.random.default_rng(0).normal(size=(500, 4, 3))
+    scene.trail("runs", places)
+    np.testing.assert_allclose(
+        scene._nodes["runs"]._handle.points,
+        np.stack([places[:, :-1], places[:, 1:]], axis=2).reshape(-1, 2, 3),
+        rtol=1e-6,
+    )
+    scene.dots("states", places[:, 0], 0.02)
+    node = scene._nodes["states"]
+    np.testing.assert_allclose(node._handle.points, places[:, 0], rtol=1e-6)
+    scene.dots("states", places[:7, 1], 0.02)
+    assert scene._nodes["states"] is node
+    assert node._handle.points.shape == (7, 3)
+    scene._nodes.show_drawn()
+    scene.dots("states", np.empty((0, 3)), 0.02)
+    scene.trail("runs", np.empty((0, 4, 3)))
+    assert scene._nodes.show_drawn() == []

@@ -1,0 +1,78 @@
+"""What is kept of a run: the last seconds of motion, earlier predictions, and the first one."""
+
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+
+from labs.problems.receding_horizon import Plan
+
+PAST = 200
+"""World steps of the motion that are kept."""
+FAN, STRIDE = 8, 0.08
+"""Earlier predictions that are kept; the time [s] between two of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """What a plan says: X (N + 1, nx) from the time t [s] on, in steps of h [s]."""
+
+    t: float
+    h: float
+    X: np.ndarray
+
+    @property
+    def times(self) -> np.ndarray:
+        """(N + 1,) [s]"""
+        return self.t + self.h * np.arange(len(self.X))
+
+    def at(self, t: float) -> np.ndarray | None:
+        """(nx,) at one of its times; None beyond them."""
+        k = round((t - self.t) / self.h)
+        return self.X[k] if 0 <= k < len(self.X) else None
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Arrays are never written into again."""
+
+    past: np.ndarray
+    """(up to PAST, nx) the states of the last world steps, the present one last."""
+    fan: tuple[Prediction, ...] = ()
+    """Earlier predictions, the oldest first."""
+    latest: Prediction | None = None
+    first: Prediction | None = None
+    promised: float | None = None
+    """What the first plan was to cost."""
+    paid: float = 0.0
+    """What was paid since then, up to the present period,"""
+    over_horizon: float | None = None
+    """and over the horizon of the first plan, with l_f at its end; None before that."""
+    off_first: float = 0.0
+    """Largest deviation of a position from the first plan, while it lasts."""
+
+    def moved(self, x: np.ndarray) -> Self:
+        """A world step later, at x."""
+        return replace(self, past=np.concatenate([self.past[1 - PAST :], x[None]]))
+
+    def planned(self, plan: Plan, t: float, h: float) -> Self:
+        """With a new plan, which begins at t."""
+        now, fan = Prediction(t, h, plan.X), self.fan
+        if self.latest and (not fan or self.latest.t - fan[-1].t > STRIDE - 0.5 * h):
+            fan = (*fan, self.latest)[-FAN:]
+        if self.first is None:
+            return replace(self, latest=now, first=now, promised=plan.cost)
+        return replace(self, latest=now, fan=fan)
+
+    def met(self, x: np.ndarray, t: float, running: float, final: float) -> Self:
+        """At the start of a period, at x, the last one having cost `running`; `final` is l_f."""
+        paid, first = self.paid + running, self.first
+        if first is None:
+            return self
+        planned, n = first.at(t), len(x) // 2
+        if planned is None:
+            return replace(self, paid=paid)
+        off = max(self.off_first, float(np.abs(x[:n] - planned[:n]).max()))
+        ended = t > first.times[-1] - 0.5 * first.h
+        over = paid + final if ended else self.over_horizon
+        return replace(self, paid=paid, off_first=off, over_horizon=over)

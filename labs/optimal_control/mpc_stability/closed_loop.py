@@ -1,0 +1,102 @@
+"""The run under MPC: at every period a plan, of which the first control acts, and V* on the way."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from labs.algorithms import mpc
+from labs.algorithms.mpc import Options, RecedingHorizon
+from labs.optimal_control.mpc_stability.formulation import Formulation
+from labs.resumable import run_to_completion
+from labs.tasks.phase_plane.systems import STEP
+
+OPTIONS = Options()
+FAR = 1.2
+"""Beyond so many times the window a run ends."""
+KEPT = 600
+"""Periods of a run that are kept."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """From its start. Arrays are never written after they are made."""
+
+    x: np.ndarray
+    """(2,)"""
+    steps: int
+    """Since the start, of STEP."""
+    controller: RecedingHorizon
+    path: np.ndarray
+    """(k, 2) the errors at the beginning of every period, the present one the last; the states
+    where nothing is followed."""
+    V: np.ndarray
+    """(k,) V* there; 0 where there is no plan."""
+    found: np.ndarray
+    """(k,) whether there is one."""
+    paid: np.ndarray
+    """(k,) l(x, u) of each period."""
+    ended: str = ""
+    """Why it goes no further, in a sentence."""
+
+    @property
+    def k(self) -> int:
+        """The present period, from 0."""
+        return self.controller.period - 1
+
+    @property
+    def excess(self) -> np.ndarray:
+        """V*(x+) - V*(x) + l(x, u) of every period that is over and had a plan, as the next."""
+        both = self.found[1:] & self.found[:-1]
+        return np.asarray((np.diff(self.V) + self.paid[:-1])[both])
+
+
+def begin(formulation: Formulation, x: np.ndarray) -> Run:
+    """At x (2,), with the first plan; none where there is no such problem."""
+    controller, nothing = mpc.init(OPTIONS, np.zeros(1)), np.zeros(0)
+    run = Run(
+        x, 0, controller, np.zeros((0, 2)), nothing, nothing > 0.0, nothing, formulation.trouble
+    )
+    return run if run.ended else _plan(formulation, run)
+
+
+def advance(formulation: Formulation, run: Run) -> Run:
+    """STEP later. Far outside the window a run ends."""
+    if run.ended:
+        return run
+    A, B = formulation.step
+    run = replace(run, x=A @ run.x + B @ control(formulation, run), steps=run.steps + 1)
+    if (np.abs(run.x) > FAR * formulation.window.h[:2]).any():
+        seconds = run.steps * STEP
+        return replace(run, ended=f"After {seconds:.2f} s it is far out: begin elsewhere.")
+    if run.steps % round(formulation.settings.period / STEP):
+        return run
+    return _plan(formulation, run)
+
+
+def control(formulation: Formulation, run: Run) -> np.ndarray:
+    """(1,) what acts: the plan's, on top of the reference's."""
+    return np.asarray(run.controller.u + formulation.reference.controls(np.array(max(run.k, 0))))
+
+
+def _plan(formulation: Formulation, run: Run) -> Run:
+    """At the beginning of a period."""
+    k, problem = run.k + 1, formulation.problem
+    error = run.x - formulation.reference.states(np.array(k))
+
+    def model(e: np.ndarray, u: np.ndarray) -> np.ndarray:
+        return np.asarray(problem.A @ e + problem.B @ u)
+
+    planner, brake = formulation.planner_at(k), np.zeros(1)
+    work = mpc.step(planner, model, OPTIONS, run.controller, error, brake)
+    controller = run_to_completion(work)
+    plan = controller.plan
+    found = plan is not None and not controller.status
+    paid = float(formulation.stage_cost(error, controller.u))
+    return replace(
+        run,
+        controller=controller,
+        path=np.vstack([run.path, error])[-KEPT:],
+        V=np.append(run.V, plan.cost if plan and found else 0.0)[-KEPT:],
+        found=np.append(run.found, found)[-KEPT:],
+        paid=np.append(run.paid, paid)[-KEPT:],
+    )

@@ -1,4 +1,4 @@
-"""Chapter A of the course."""
+"""The appendices of the course, A and B."""
 
 NUMBER = "A"
 TITLE = "Appendices"

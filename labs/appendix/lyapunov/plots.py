@@ -1,0 +1,130 @@
+"""The plots of a Lyapunov function, and what they show."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from labs.appendix.lyapunov.params import LyapunovParams
+from labs.appendix.lyapunov.runs import STEPS, Runs
+from labs.appendix.lyapunov.study import NODES, Study
+from labs.plots import Curves, HeatMap, Line, Note, Readout, TimeSeries, Trace
+
+PLOTS = (
+    Curves(
+        "Distance and its bound",
+        "step k",
+        "|x_k| / |x_0|",
+        Trace("k", "farthest", "farthest run", series=1),
+        Trace("k", "median", "median run", series=2),
+        Trace("k_bound", "bound", "c γᵏ", "dash", 0),
+        log_y=True,
+    ),
+    Curves(
+        "V along the runs",
+        "step k",
+        "V(x_k) / V(x_0)",
+        Trace("k", "V_most", "largest", series=1),
+        Trace("k", "V_median", "median", series=2),
+        Trace("k_bound", "V_bound", "(1 − α₃/α₂)ᵏ", "dash", 0),
+        log_y=True,
+    ),
+    HeatMap(
+        "Change of V in a step",
+        "map_q",
+        "map_v",
+        "map_change",
+        "{q_name}",
+        "{v_name}",
+        "(V(f(x)) − V(x)) / |V(x)|",
+        gaps=True,
+    ),
+    TimeSeries("V of the body", "", Line("body_V", "V(x)")),
+    Note("Conditions", "conditions"),
+    Readout("level_max", "Largest level", ""),
+    Readout("alpha_1", "α₁", ""),
+    Readout("alpha_2", "α₂", ""),
+    Readout("alpha_3", "α₃", ""),
+    Readout("c", "Factor c", ""),
+    Readout("gamma", "Rate γ", ""),
+    Readout("left", "Have left the set", "", whole=True),
+    Readout("decreasing", "V decreases in", "%"),
+    Readout("covered", "Largest set covers", "%"),
+)
+COARSE = 2
+"""The map shows every second node."""
+LARGEST_CHANGE = 1.0
+"""In parts of V; what is larger is shown as this."""
+TINY = 1e-12
+
+
+def run_fields(runs: Runs | None, found: Study | None) -> Mapping[str, np.ndarray]:
+    """The runs against what the constants promise."""
+    none = np.empty(0)
+    fields = dict.fromkeys(
+        ("k", "farthest", "median", "V_most", "V_median", "k_bound", "bound", "V_bound"), none
+    )
+    if runs is None or found is None or runs.k < 0:
+        return fields
+    distances, V = (
+        np.maximum(some / np.where(some[0] == 0.0, 1.0, some[0]), TINY)
+        for some in (runs.distances, runs.V)
+    )
+    fields |= {
+        "k": np.arange(runs.k + 1.0),
+        "farthest": distances.max(axis=1),
+        "median": np.median(distances, axis=1),
+        "V_most": V.max(axis=1),
+        "V_median": np.median(V, axis=1),
+    }
+    constants = found.constants
+    if constants.holds:
+        rate = 1.0 - constants.alpha_3 / constants.alpha_2
+        fields |= {
+            "k_bound": np.arange(STEPS + 1.0),
+            "bound": constants.bound(STEPS),
+            "V_bound": rate ** np.arange(STEPS + 1.0),
+        }
+    return fields
+
+
+def map_fields(params: LyapunovParams, found: Study | None) -> Mapping[str, np.ndarray]:
+    """The change of V over the window; empty where V = 0."""
+    window = params.loop.window
+    axes = [np.linspace(-half, half, NODES)[::COARSE] for half in window]
+    change = np.full((len(axes[1]), len(axes[0])), np.nan)
+    if found is not None:
+        change = relative_change(found)[::COARSE, ::COARSE]
+    return {"map_q": axes[0], "map_v": axes[1], "map_change": change}
+
+
+def relative_change(found: Study) -> np.ndarray:
+    """(NODES, NODES): of V in a step, in parts of its size; NaN where V = 0."""
+    size = np.abs(found.V)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(size > 0.0, found.change / size, np.nan)
+    return np.clip(share, -LARGEST_CHANGE, LARGEST_CHANGE)
+
+
+def conditions(params: LyapunovParams, found: Study | None, failure: str) -> str:
+    """The three conditions on the set, each with its number."""
+    if found is None:
+        return failure or "Not known yet."
+    a = found.constants
+    if params.set == "box":
+        where = "in the box"
+    else:
+        where = "in the level set" if found.level > 0.0 else "in the window"
+    lines = [
+        f"V ≥ α₁|x|² {where}: "
+        + (f"holds, α₁ = {a.alpha_1:.3g}." if a.alpha_1 > 0.0 else _fails(a.alpha_1)),
+        f"V ≤ α₂|x|² {where}: holds, α₂ = {a.alpha_2:.3g}.",
+        f"V(f(x)) − V(x) ≤ −α₃|x|² {where}: "
+        + (f"holds, α₃ = {a.alpha_3:.3g}." if a.alpha_3 > 0.0 else _fails(a.alpha_3)),
+    ]
+    if a.holds:
+        lines.append(f"So |x_k| ≤ c γᵏ |x₀| with c = {a.c:.3g}, γ = {a.gamma:.4f}.")
+    return "\n".join(lines)
+
+
+def _fails(least: float) -> str:
+    return f"fails, the best number is {least:.3g}."

@@ -8,6 +8,7 @@ import platform
 from tests.benchmarks import (
     ddp,
     direct,
+    drag,
     dynamic_programming,
     frames,
     headless,
@@ -15,6 +16,7 @@ from tests.benchmarks import (
     latency,
     load,
     lqr,
+    mpc,
     resolve,
     td_control,
 )
@@ -26,6 +28,8 @@ MEASURES = {
     "ddp-growth": ddp.growth,
     "direct": direct.beside_ipopt,
     "direct-iteration": direct.on_the_ur5,
+    "direct-drag": drag.target_to_motion,
+    "mpc": mpc.everything,
     "value-iteration": dynamic_programming.on_the_pendulum,
     "q-learning": td_control.q_learning_steps,
     "slider": latency.slider_to_telemetry,

@@ -6,6 +6,7 @@ same settings."""
 
 import multiprocessing
 import os
+import re
 from concurrent.futures import ProcessPoolExecutor
 
 os.environ["ORCLAB_LABS"] = "tests.sample_labs"
@@ -21,15 +22,17 @@ from tests.served import Served, until
 
 ORDER = (
     "browser/test_every_lab.py",
-    "labs/test_contract.py",
     "browser",
     "server",
     "test_types.py",
-    "labs/test_live_sessions.py",
     "labs",
     "",
 )
 """What begins first: the longest pieces."""
+OF_A_LAB = re.compile(
+    r"labs/(?:test_(?:contract|live_sessions)\.py::\w+\[([a-z0-9-]+)(?:: .*)?\]$|\w+/(\w+)/test_)"
+)
+"""A test of all labs that names this one, or a test in its own folder."""
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
@@ -54,22 +57,32 @@ def _prepare(slug: str) -> None:
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Into an order."""
-    here = config.rootpath / "tests"
-    paths = {item: item.path.relative_to(here).as_posix() for item in items}
-    items.sort(key=lambda item: next(i for i, x in enumerate(ORDER) if paths[item].startswith(x)))
+
+    def place(item: pytest.Item) -> tuple[int, str]:
+        name = item.nodeid.removeprefix("tests/")
+        return next(i for i, x in enumerate(ORDER) if name.startswith(x)), _lab(name)
+
+    items.sort(key=place)
+
+
+def _lab(nodeid: str) -> str:
+    """The lab that a test looks at, if it is one."""
+    found = OF_A_LAB.match(nodeid)
+    return next(filter(None, found.groups())).replace("_", "-") if found else ""
 
 
 class Lanes(LoadScopeScheduling):  # type: ignore[misc]
-    """What stays together in one lane: all tests of the server, almost all of the browser, else
-    those of a file."""
+    """What stays together in one lane: all tests of the server, almost all of the browser, those of
+    a lab, which share runs of its solver, else those of a file."""
 
     def _split_scope(self, nodeid: str) -> str:
-        path = nodeid.partition("::")[0].removeprefix("tests/")
+        nodeid = nodeid.removeprefix("tests/")
+        path = nodeid.partition("::")[0]
         folder = path.partition("/")[0]
         if path == "browser/test_comeback.py":
             return "server"  # it ends the servers that those tests end, too
         alone = folder == "labs" or path == "browser/test_every_lab.py"
-        return path if alone else folder
+        return _lab(nodeid) or (path if alone else folder)
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Lanes:

@@ -14,10 +14,10 @@ from tests.served import PATIENCE, Served
 SCREENSHOTS = Path("screenshots")
 SLOW_SCENES = """if (location.pathname.startsWith("/scene/")) {
   const next = requestAnimationFrame;
-  window.requestAnimationFrame = (draw) => setTimeout(() => next(draw), 60);
+  window.requestAnimationFrame = (draw) => setTimeout(() => next(draw), 100);
   window.cancelAnimationFrame = clearTimeout;
 }"""
-"""Some 13 frames a second: drawn in software at full speed, a scene takes a core and more."""
+"""Some 9 frames a second: drawn in software at full speed, a scene takes a core and more."""
 Visit = Callable[..., BrowserContext]
 
 

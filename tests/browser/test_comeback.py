@@ -30,7 +30,7 @@ def test_a_killed_worker_comes_back_with_the_same_parameters(page: Page, served:
 
 
 def test_a_restarted_server_is_found_again(visit: Visit, mortal: Served) -> None:
-    lab = LabPage(visit(mortal).new_page()).open("joint-control", "?kp=512")
+    lab = LabPage(visit(mortal).new_page(), scene=False).open("joint-control", "?kp=512")
     old = lab.status()["id"]
     mortal.stop()
     expect(lab.page.locator("body")).to_contain_text(re.compile("lost|does not answer"))
@@ -44,12 +44,13 @@ def test_a_restarted_server_is_found_again(visit: Visit, mortal: Served) -> None
 
 def test_a_full_house_says_so_and_lets_in_when_there_is_room(visit: Visit, mortal: Served) -> None:
     page = visit(mortal).new_page()
+    lab = LabPage(page, scene=False)
     with mortal.session("oscillator"):
         page.goto("/labs/joint-control")
         expect(page.locator("body")).to_contain_text("all 1 places are taken")
         screenshot(page, "full")
     page.locator("#banner button").first.click()
-    LabPage(page).wait_live()
+    lab.wait_live()
 
 
 def test_an_idle_session_rests_until_it_is_wanted(visit: Visit, impatient: Served) -> None:

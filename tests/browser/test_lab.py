@@ -81,7 +81,9 @@ def test_the_panel_opens_in_full_screen_and_alone_and_tells_the_same(page: Page)
 
 
 def test_dragging_a_knob_changes_the_motion(page: Page) -> None:
-    lab = LabPage(page).open("joint-control", "?controller=pid&kp=1000&reference=set-point")
+    lab = LabPage(page, scene=False).open(
+        "joint-control", "?controller=pid&kp=1000&reference=set-point"
+    )
     track = page.locator("#track-kp")
     track.scroll_into_view_if_needed()
     box = track.bounding_box()
@@ -260,7 +262,7 @@ def test_a_scene_whose_load_is_broken_off_draws_all_the_same(page: Page) -> None
 
 
 def test_everything_goes_by_keyboard(page: Page) -> None:
-    lab = LabPage(page).open("joint-control", "?kp=500")
+    lab = LabPage(page, scene=False).open("joint-control", "?kp=500")
     page.keyboard.press("?")
     expect(page.get_by_role("dialog")).to_be_visible()
     page.keyboard.press("Escape")
@@ -284,7 +286,7 @@ WILD = "?integrator=explicit-euler&step=0.01&kd=0&kp=2000&torque_limits=false"
 
 
 def test_divergence_is_explained_and_reset_recovers(page: Page) -> None:
-    lab = LabPage(page).open("joint-control", WILD)
+    lab = LabPage(page, scene=False).open("joint-control", WILD)
     banner = page.locator("#banner")
     expect(banner).to_be_visible()
     expect(banner).to_contain_text(re.compile(r"t = \d"))

@@ -21,7 +21,7 @@ def iteration(page: Page) -> int:
 
 
 def test_it_runs_is_held_and_goes_step_by_step(page: Page) -> None:
-    LabPage(page).open("descent")
+    LabPage(page, scene=False).open("descent")
     expect(page.locator("#solver-says")).to_have_text(DONE)
     expect(page.locator("#iterations")).to_have_text("200")
     page.keyboard.press("o")

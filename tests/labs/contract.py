@@ -1,6 +1,5 @@
 """What must hold of every lab at any time, and the settings the tests of the contract try."""
 
-import pickle
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
@@ -17,7 +16,7 @@ from labs.engine.run import World
 from labs.lab import State
 from labs.params import Choice, Knob, Text, Value
 from labs.scene import Color, cell_centers
-from labs.shapes import Body
+from labs.shapes import Body, Vector3
 from server.articles import render
 
 Point = tuple[float, float, float]
@@ -58,12 +57,15 @@ def settings(entry: Entry) -> Iterator[tuple[str, Mapping[str, Value]]]:
 
 
 def variants(entry: Entry) -> Iterator[Mapping[str, Value]]:
-    """The defaults, every preset, every experiment, and every option of every choice."""
+    """The defaults, every preset, every experiment, and every other option of every choice that
+    acts."""
     yield {}
     for _, changes in settings(entry):
         yield changes
+    defaults = entry.lab.Params()
     for name, value in extremes(entry):
-        if isinstance(entry.lab.Params.tunables[name], Choice):
+        is_choice = isinstance(defaults.tunables[name], Choice)
+        if is_choice and defaults.acts(name) and value != getattr(defaults, name):
             yield {name: value}
 
 
@@ -108,9 +110,9 @@ class CheckingScene:
     ) -> None:
         self._new(name, color)
         assert 0.0 < strength <= 1.0
-        assert points.ndim == 2
-        assert points.shape[0] >= 2, "a line has two ends"
-        assert points.shape[1] == 3
+        assert points.ndim in (2, 3)
+        assert points.shape[-2] >= 2, "a line has two ends"
+        assert points.shape[-1] == 3
         assert np.isfinite(points).all()
 
     def arrow(self, name: str, start: ArrayLike, end: ArrayLike, color: Color = "force") -> None:
@@ -195,6 +197,31 @@ class CheckingScene:
         assert starts.shape == ends.shape
         assert np.isfinite(starts).all()
         assert np.isfinite(ends).all()
+
+    def polygon(
+        self,
+        name: str,
+        corners: np.ndarray,
+        color: Color | Vector3 = "actual",
+        opacity: float = 1.0,
+    ) -> None:
+        self._new(name, color if isinstance(color, str) else "actual")
+        if not isinstance(color, str):
+            _colors(np.array(color))
+        assert 0.0 < opacity <= 1.0
+        assert corners.ndim == 2
+        assert corners.shape[0] >= 3, "a polygon has three corners"
+        assert corners.shape[1] == 3
+        assert np.isfinite(corners).all()
+
+    def dots(
+        self, name: str, centers: np.ndarray, diameter: float, color: Color = "actual"
+    ) -> None:
+        self._new(name, color)
+        assert 0.0 < diameter < np.inf
+        assert centers.ndim == 2
+        assert centers.shape[1] == 3
+        assert np.isfinite(centers).all()
 
     def _new(self, name: str, color: Color = "actual") -> None:
         assert name.strip()
@@ -307,7 +334,7 @@ def numbers(value: Any) -> Iterator[np.ndarray]:
 
 def same(a: Any, b: Any) -> bool:
     """Whether two states hold bit for bit the same."""
-    return bool(pickle.dumps(plain(a)) == pickle.dumps(plain(b)))
+    return bool(plain(a) == plain(b))
 
 
 def plain(value: Any) -> Any:
@@ -321,11 +348,11 @@ def plain(value: Any) -> Any:
         hidden = {"seconds"} if isinstance(value, State) else set()
         names = [f.name for f in fields(value) if f.name not in hidden]
         named = [(name, plain(getattr(value, name))) for name in names]
-        return repr((type(value).__name__, named))
+        return (type(value).__name__, tuple(named))
     if isinstance(value, Mapping):
-        return repr([(key, plain(part)) for key, part in value.items()])
+        return tuple((key, plain(part)) for key, part in value.items())
     if isinstance(value, list | tuple):
-        return repr([plain(part) for part in value])
+        return tuple(plain(part) for part in value)
     return repr(value)
 
 

@@ -1,0 +1,115 @@
+"""Reaching, to be learned: a UR5 that moves its shoulder and elbow, the other joints locked, for
+deep Q-learning and, to come, Gymnasium.
+
+Each of the two motors holds its arm against gravity and adds a torque to be chosen, held for a
+period. A step costs
+
+    l = w_p |p(q) - p*| + w_v |v|^2 + w_u |u / u_max|^2
+
+with p the tip and p* = p(q*) its target. The posture q* differs from episode to episode and is
+part of the state, x = (q, v, q*); the network is told p* - p(q). No state ends the task.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+
+import numpy as np
+import pinocchio as pin
+
+from labs.models.arms import load
+from labs.random_numbers import uniform
+from labs.tasks.environments.swing_up import PERIOD
+
+MOVING = (1, 2)
+"""Shoulder lift and elbow."""
+RANGES = np.array([[-2.2, -0.6], [0.4, 2.2]])
+"""[rad] of each, within which episodes begin and targets lie: clear of the floor."""
+
+VELOCITY_LIMIT = np.pi
+"""[rad/s]"""
+WEIGHTS = (1.0, 0.01, 0.01)
+"""w_p [1/m], w_v [s^2/rad^2], w_u."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """An `Environment`."""
+
+    model: pin.Model
+    """Of the two joints."""
+    data: pin.Data
+    tip: int
+    """A frame of the model."""
+    torques: np.ndarray
+    """(nu, 2) [N m] beyond gravity's."""
+    largest: np.ndarray
+    """u_max (2,) [N m]"""
+
+    nx = 6
+    observation_size = 8
+    substeps = 4
+    horizon = 60
+
+    @property
+    def control_count(self) -> int:
+        return len(self.torques)
+
+    def tips(self, Q: np.ndarray) -> np.ndarray:
+        """(k, 3) [m] at joint angles Q (k, 2)."""
+        model, data, found = self.model, self.data, np.empty((len(Q), 3))
+        for p, q in zip(found, Q, strict=True):
+            pin.framesForwardKinematics(model, data, q)
+            p[:] = data.oMf[self.tip].translation
+        return found
+
+    def starts(self, random: np.ndarray, many: int) -> np.ndarray:
+        drawn = np.array([[uniform(random) for _ in range(4)] for _ in range(many)])
+        low, size = RANGES[:, 0], RANGES[:, 1] - RANGES[:, 0]
+        return np.hstack(
+            [low + size * drawn[:, :2], np.zeros((many, 2)), low + size * drawn[:, 2:]]
+        )
+
+    def observe(self, X: np.ndarray) -> np.ndarray:
+        """Angles about the middle of their ranges, velocities in parts of their limit, and the way
+        to the target: (3,) [m], and its length."""
+        way = self.tips(X[:, 4:]) - self.tips(X[:, :2])
+        parts = [
+            (X[:, :2] - RANGES.mean(axis=1)) / np.pi,
+            X[:, 2:4] / VELOCITY_LIMIT,
+            way,
+            np.linalg.norm(way, axis=1, keepdims=True),
+        ]
+        return np.concatenate(parts, axis=1, dtype=np.float32)
+
+    def advance(self, X: np.ndarray, U: np.ndarray) -> np.ndarray:
+        model, data, limit, h = self.model, self.data, VELOCITY_LIMIT, PERIOD / self.substeps
+        after = X.copy()
+        for x, torque in zip(after, self.torques[U], strict=True):
+            held = pin.computeGeneralizedGravity(model, data, x[:2])
+            x[2:4] += h * pin.aba(model, data, x[:2], x[2:4], held + torque)
+        after[:, 2:4] = np.clip(after[:, 2:4], -limit, limit)
+        after[:, :2] += h * after[:, 2:4]
+        return after
+
+    def step(self, X: np.ndarray, U: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        w_p, w_v, w_u = WEIGHTS
+        distance = np.linalg.norm(self.tips(X[:, 4:]) - self.tips(X[:, :2]), axis=1)
+        costs = w_p * distance + w_v * (X[:, 2:4] ** 2).sum(axis=1)
+        costs += w_u * ((self.torques[U] / self.largest) ** 2).sum(axis=1)
+        for _ in range(self.substeps):
+            X = self.advance(X, U)
+        return X, costs, np.zeros(len(X), bool)
+
+
+@cache
+def reach() -> Reach:
+    """With three torques a joint."""
+    arm = load("ur5")
+    locked = [i + 1 for i in range(arm.model.nq) if i not in MOVING]
+    model = pin.buildReducedModel(arm.model, locked, arm.home)
+    model.armature = arm.model.armature[list(MOVING)]
+    largest = np.array([30.0, 15.0])
+    torques = largest * np.array(list(product((-1.0, 0.0, 1.0), repeat=2)))
+    tip = model.getFrameId(arm.model.frames[arm.tip].name)
+    return Reach(model, model.createData(), tip, torques, largest)

@@ -5,9 +5,27 @@ it lets a loop go on from there bit for bit, wherever it was interrupted."""
 
 import numpy as np
 
-from labs.compiled import compiled
+from labs.compiled import compiled, inlined
 
 _SCALE = 2.0**-53
+_LAYERS = 256
+_TAIL = 3.6541528853610088
+"""Where the normal density's tail is cut off: 256 pieces of one area are left of it."""
+_AREA = 0.00492867323399
+"""Of each of them, the tail included."""
+
+
+def _layers() -> np.ndarray:
+    """(257,) right ends of the layers of the normal density, from the widest to 0."""
+    ends = np.zeros(_LAYERS + 1)
+    ends[:2] = _AREA * np.exp(0.5 * _TAIL**2), _TAIL
+    for i in range(2, _LAYERS):
+        height = _AREA / ends[i - 1] + np.exp(-0.5 * ends[i - 1] ** 2)
+        ends[i] = np.sqrt(-2.0 * np.log(height))
+    return ends
+
+
+_ENDS = _layers()
 
 
 def seeded(rng: np.random.Generator, many: int) -> np.ndarray:
@@ -45,3 +63,38 @@ def below(state: np.ndarray, n: int) -> int:
     """An integer in 0..n-1. For the few hundred it is asked for, none is favoured by more than
     n / 2^53."""
     return int(uniform(state) * n)
+
+
+@inlined
+def normal(state: np.ndarray) -> float:
+    """A float of the standard normal distribution: the ziggurat of Marsaglia and Tsang (2000) as
+    Doornik (2005) has it, a layer and a place in it from separate bits."""
+    drawn = bits(state)
+    layer = int(drawn & np.uint64(_LAYERS - 1))
+    x = (2.0 * (float(drawn >> np.uint64(11)) * _SCALE) - 1.0) * _ENDS[layer]
+    # Nearly always it is in the part of the layer that lies wholly under the density.
+    return float(x) if abs(x) < _ENDS[layer + 1] else _at_the_edge(state, layer, x)
+
+
+@compiled
+def _at_the_edge(state: np.ndarray, layer: int, x: float) -> float:
+    while abs(x) >= _ENDS[layer + 1]:
+        if layer == 0:
+            return float(np.copysign(_tail(state), x))
+        outer = np.exp(-0.5 * (_ENDS[layer] ** 2 - x * x))
+        inner = np.exp(-0.5 * (_ENDS[layer + 1] ** 2 - x * x))
+        if outer + uniform(state) * (inner - outer) < 1.0:
+            break
+        drawn = bits(state)
+        layer = int(drawn & np.uint64(_LAYERS - 1))
+        x = (2.0 * (float(drawn >> np.uint64(11)) * _SCALE) - 1.0) * _ENDS[layer]
+    return float(x)
+
+
+@compiled
+def _tail(state: np.ndarray) -> float:
+    """Of the normal distribution beyond _TAIL."""
+    while True:
+        x = -np.log(1.0 - uniform(state)) / _TAIL
+        if -2.0 * np.log(1.0 - uniform(state)) > x * x:
+            return float(_TAIL + x)

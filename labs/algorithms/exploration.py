@@ -6,6 +6,10 @@ With costs Q (X, U), visits N (X, U) and n(x) = 1 + sum_u N(x, u), the visit tha
     Boltzmann        P(u) proportional to exp(-beta_n Q(x, u))
     confidence       u = argmin_u Q(x, u) - L sqrt(2 log n / N(x, u)), untried controls first
     follow           u = mu(x), but with probability eps_n any control: somebody else drives
+    Thompson         u = argmin_u of one draw each from N(Q(x, u), L^2 / N(x, u)), untried first
+
+The last one is beyond the notes (Thompson 1933): u is chosen as often as it is the best, as far as
+one knows who has seen N costs of mean Q and standard deviation L and expected nothing before.
 
 Greedy in the limit with infinite exploration (GLIE) for decay 0 < d <= 1:
 
@@ -20,9 +24,9 @@ from typing import NamedTuple
 import numpy as np
 
 from labs.compiled import compiled, inlined
-from labs.random_numbers import below, uniform
+from labs.random_numbers import below, normal, uniform
 
-EPSILON_GREEDY, BOLTZMANN, CONFIDENCE, FOLLOW = range(4)
+EPSILON_GREEDY, BOLTZMANN, CONFIDENCE, FOLLOW, THOMPSON = range(5)
 
 
 class BehaviourPolicy(NamedTuple):
@@ -36,7 +40,7 @@ class BehaviourPolicy(NamedTuple):
     beta: float = 1.0
     """Inverse temperature [1/cost]."""
     bound: float = 1.0
-    """L [cost]."""
+    """L [cost]: of confidence, the largest cost; of Thompson's, its standard deviation."""
     policy: np.ndarray = np.zeros(0, np.int64)
     """(X,) int64: mu, for FOLLOW; empty otherwise."""
 
@@ -67,32 +71,67 @@ def greedy(q: np.ndarray, x: int, random: np.ndarray) -> int:
 
 
 @compiled
-def boltzmann(costs: np.ndarray, beta: float, random: np.ndarray) -> int:
-    """A control with probability proportional to exp(-beta cost). Costs (U,) count from the least
+def boltzmann(q: np.ndarray, x: int, beta: float, random: np.ndarray) -> int:
+    """A control with probability proportional to exp(-beta Q(x, u)). Costs count from the least
     one, so that nothing overflows."""
-    least, total = costs.min(), 0.0
-    for cost in costs:
-        total += np.exp(-beta * (cost - least))
+    controls, least, best = q.shape[1], q[x, 0], 0
+    for u in range(1, controls):
+        if q[x, u] < least:
+            least, best = q[x, u], u
+    weights, total = np.empty(controls), 0.0
+    for u in range(controls):
+        weights[u] = np.exp(-beta * (q[x, u] - least))
+        total += weights[u]
     left = uniform(random) * total
-    for u in range(len(costs)):
-        left -= np.exp(-beta * (costs[u] - least))
+    for u in range(controls):
+        left -= weights[u]
         if left < 0.0:
             return u
-    return int(np.argmin(costs))
+    return best
 
 
 @compiled
-def confidence(costs: np.ndarray, visits: np.ndarray, bound: float, random: np.ndarray) -> int:
-    """The control of the lowest confidence bound; an untried one comes before all others. Costs
-    and visits are (U,)."""
-    scores = np.empty((1, len(costs)))
-    logarithm = 2.0 * np.log(1.0 + visits.sum())
-    for u in range(len(costs)):
-        if visits[u] == 0:
-            scores[0, u] = -np.inf
-        else:
-            scores[0, u] = costs[u] - bound * np.sqrt(logarithm / visits[u])
+def confidence(q: np.ndarray, x: int, visits: np.ndarray, bound: float, random: np.ndarray) -> int:
+    """The control of the lowest confidence bound; an untried one comes before all others."""
+    width = bound * np.sqrt(2.0 * np.log(1.0 + _tries(visits, x)))
+    least, best, ties = np.inf, 0, 0
+    for u in range(q.shape[1]):
+        score = _lower_bound(q[x, u], visits[x, u], width)
+        if score < least:
+            least, best, ties = score, u, 1
+        elif score == least:
+            ties += 1
+    if ties == 1:
+        return best
+    scores = np.empty((1, q.shape[1]))
+    for u in range(q.shape[1]):
+        scores[0, u] = _lower_bound(q[x, u], visits[x, u], width)
     return greedy(scores, 0, random)
+
+
+@compiled
+def thompson(
+    q: np.ndarray, x: int, visits: np.ndarray, deviation: float, random: np.ndarray
+) -> int:
+    """The control whose mean cost, drawn from what is believed of it, is the least; an untried one
+    comes before all others."""
+    scores = np.empty((1, q.shape[1]))
+    for u in range(q.shape[1]):
+        scores[0, u] = _lower_bound(q[x, u], visits[x, u], deviation * normal(random))
+    return greedy(scores, 0, random)
+
+
+@inlined
+def _lower_bound(cost: float, n: int, width: float) -> float:
+    return float(cost - width / np.sqrt(n)) if n > 0 else -np.inf
+
+
+@inlined
+def _tries(visits: np.ndarray, x: int) -> int:
+    tries = 0
+    for u in range(visits.shape[1]):
+        tries += visits[x, u]
+    return tries
 
 
 @compiled
@@ -101,11 +140,15 @@ def _choose_otherwise(
 ) -> int:
     """Whatever is not epsilon-greedy with a constant epsilon."""
     if behaviour.kind == CONFIDENCE:
-        return confidence(q[x], visits[x], behaviour.bound, random)
-    n = 1.0 + visits[x].sum() if behaviour.decay > 0.0 else 1.0
+        return confidence(q, x, visits, behaviour.bound, random)
+    if behaviour.kind == THOMPSON:
+        return thompson(q, x, visits, behaviour.bound, random)
+    n = 1.0 + _tries(visits, x) if behaviour.decay > 0.0 else 1.0
     if behaviour.kind == BOLTZMANN:
-        return boltzmann(q[x], behaviour.beta * (1.0 + np.log(n)), random)
-    if uniform(random) < behaviour.epsilon * n**-behaviour.decay:
+        cooling = 1.0 + np.log(n) if behaviour.decay > 0.0 else 1.0
+        return boltzmann(q, x, behaviour.beta * cooling, random)
+    fading = 1.0 / n if behaviour.decay == 1.0 else n**-behaviour.decay
+    if uniform(random) < behaviour.epsilon * fading:
         return below(random, q.shape[1])
     return int(behaviour.policy[x]) if behaviour.kind == FOLLOW else greedy(q, x, random)
 

@@ -55,6 +55,8 @@ class UpdateRule(NamedTuple):
     """The values stand still through an episode and take all its updates at its end."""
     limit: float = 1e12
     """An estimate beyond this magnitude diverges: the episode is broken off."""
+    beta: float = 0.05
+    """Step size of the second weights of gradient TD."""
 
 
 class Learner(NamedTuple):
@@ -133,4 +135,6 @@ def step_size(rule: UpdateRule, n: int) -> float:
 
 @compiled
 def _decreasing(rule: UpdateRule, n: int) -> float:
+    if rule.omega == 1.0:
+        return rule.alpha * (1.0 / n)
     return float(rule.alpha * float(n) ** -rule.omega)

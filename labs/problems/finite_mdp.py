@@ -99,7 +99,10 @@ class FiniteMDP:
     def transition_matrix(self, policy: np.ndarray) -> np.ndarray:
         """P^pi (X, X): of the Markov chain that remains under a policy."""
         weights = self._weights(policy)
-        matrix: np.ndarray = np.einsum("xu,uxy->xy", weights, self.probabilities)
+        if self.successor is None:
+            return np.asarray(np.einsum("xu,uxy->xy", weights, self.probabilities))
+        matrix = np.zeros((self.X, self.X))
+        np.add.at(matrix, (np.arange(self.X)[:, None], self.successor), weights)
         return matrix
 
     def policy_cost(self, policy: np.ndarray) -> np.ndarray:

@@ -18,6 +18,7 @@ from tests.benchmarks import (
     lqr,
     mpc,
     resolve,
+    rl,
     td_control,
 )
 
@@ -32,6 +33,7 @@ MEASURES = {
     "mpc": mpc.everything,
     "value-iteration": dynamic_programming.on_the_pendulum,
     "q-learning": td_control.q_learning_steps,
+    "rl": rl.sweeps,
     "slider": latency.slider_to_telemetry,
     "scene": latency.slider_to_scene,
     "knob": knob.knob_to_telemetry,

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.special import erf
 
 from labs.algorithms.exploration import (
     BOLTZMANN,
     CONFIDENCE,
     FOLLOW,
+    THOMPSON,
     BehaviourPolicy,
     choose,
     greedy,
@@ -90,3 +92,14 @@ def test_exploration_fades_with_the_visits_of_a_state(decay: float) -> None:
 def test_following_another_controller() -> None:
     behaviour = BehaviourPolicy(FOLLOW, epsilon=0.4, policy=np.array([3]))
     np.testing.assert_allclose(frequencies(behaviour, COSTS), [0.1, 0.1, 0.1, 0.7], atol=0.012)
+
+
+def test_thompson_chooses_as_often_as_it_believes() -> None:
+    """Two controls: the first is the better one with probability Phi((Q_1 - Q_0) / s), with
+    s^2 = L^2 (1/n_0 + 1/n_1). Untried ones come first."""
+    costs, visits = np.array([1.0, 1.4]), np.array([4, 12], np.int32)
+    found = frequencies(BehaviourPolicy(THOMPSON, bound=1.5), costs, visits)
+    sure = 0.4 / (1.5 * np.sqrt(1 / 4 + 1 / 12))
+    assert found[0] == pytest.approx(0.5 * (1.0 + erf(sure / np.sqrt(2.0))), abs=0.012)
+    untried = frequencies(BehaviourPolicy(THOMPSON), costs, np.array([4, 0], np.int32))
+    assert untried.tolist() == [0.0, 1.0]

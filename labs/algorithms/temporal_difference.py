@@ -1,0 +1,63 @@
+"""Temporal-difference prediction (notes, 3.5.2 and 3.5.5): the rest of a cost-to-go is replaced by
+what is expected of it.
+
+    TD(0)     V(x_t) <- V(x_t) + alpha_n (l_t + gamma V(x_(t+1)) - V(x_t))
+    n-step    V(x_t) <- V(x_t) + alpha_n (J_t - V(x_t)),
+              J_t = l_t + gamma l_(t+1) + ... + gamma^(n-1) l_(t+n-1) + gamma^n V(x_(t+n))
+
+with V = 0 in terminal states; near the end of an episode J_t takes the costs that are left, and
+where it was cut the value of the state it was cut in. n = 1 is TD(0), n >= T is every-visit Monte
+Carlo. The state of n steps ago learns as soon as its costs are there; those of the last n steps,
+at the end, all from values before the first of these updates.
+
+alpha_n = alpha / N(x)^omega, N(x) the visits of x: constant, or with 1/2 < omega <= 1 by the
+conditions of Robbins and Monro. Each update takes one episode and changes V and visits in place,
+as in `monte_carlo`."""
+
+import numpy as np
+
+from labs.compiled import compiled
+from labs.problems.episodes import UpdateRule, step_size
+from labs.problems.prediction import Episode
+
+
+@compiled
+def td0(
+    gamma: float, episode: Episode, T: int, rule: UpdateRule, V: np.ndarray, N: np.ndarray
+) -> None:
+    """TD(0)."""
+    learned = V.copy() if rule.offline else V
+    for t in range(T):
+        x = episode.states[t]
+        N[x] += 1
+        target = episode.costs[t] + gamma * V[episode.states[t + 1]]
+        learned[x] += step_size(rule, N[x]) * (target - V[x])
+    if rule.offline:
+        V[:] = learned
+
+
+@compiled
+def n_step(
+    gamma: float, episode: Episode, T: int, rule: UpdateRule, V: np.ndarray, N: np.ndarray
+) -> None:
+    """n-step TD with n = rule.n."""
+    learned = V.copy() if rule.offline else V
+    states, costs, returns = episode.states, episode.costs, episode.returns
+    first = max(T - rule.n, 0)  # The first of the steps whose return reaches the end.
+    for t in range(first):
+        x = states[t]
+        N[x] += 1
+        J = V[states[t + rule.n]]
+        for k in range(t + rule.n - 1, t - 1, -1):
+            J = costs[k] + gamma * J
+        learned[x] += step_size(rule, N[x]) * (J - V[x])
+    J = V[states[T]]
+    for t in range(T - 1, first - 1, -1):
+        J = costs[t] + gamma * J
+        returns[t] = J
+    for t in range(first, T):
+        x = states[t]
+        N[x] += 1
+        learned[x] += step_size(rule, N[x]) * (returns[t] - V[x])
+    if rule.offline:
+        V[:] = learned

@@ -81,7 +81,7 @@ def solve_lyapunov(A: np.ndarray, Q: np.ndarray) -> np.ndarray:
     radius = float(np.abs(np.linalg.eigvals(A)).max())
     if not radius < 1.0:
         raise LabError(
-            f"no P: A has an eigenvalue of size {radius:.4g}, and the system must be stable"
+            f"no P: A has an eigenvalue of magnitude {radius:.6g}, and the system must be stable"
         )
     P, power = 0.5 * (Q + Q.T), A
     for _ in range(DOUBLINGS):

@@ -69,8 +69,10 @@ class RecedingHorizon:
     """What the next plan starts from."""
     failures: int = 0
     """Periods in which no plan was found."""
+    why: str = ""
+    """Empty while plans are found, else why none was, in a sentence,"""
     status: str = ""
-    """Empty while plans are found, else when and why not and what acts instead."""
+    """and the same with when that was and what acts instead."""
 
 
 def init(options: Options, rest: np.ndarray) -> RecedingHorizon:
@@ -99,7 +101,10 @@ def step(
             start, at.guess if options.warm else None, horizon(options, at.period)
         )
         # What it took by the clock on the wall is no part of a run.
-        plan, failed = (replace(found, seconds={}), "") if found.found else (plan, found.message)
+        if found.found:
+            plan = replace(found, seconds={})
+        else:
+            failed = found.message.rstrip(".") + "."
     age = 0 if replan and not failed else at.age + 1
     goes_on = plan is not None and age < len(plan.U) and (options.fallback == "tail" or not failed)
     chosen = control(plan, age, start) if plan is not None and goes_on else brake
@@ -112,6 +117,7 @@ def step(
         age=age,
         guess=None if plan is None else shift(plan, age + 1, model, options),
         failures=at.failures + bool(failed),
+        why=failed,
         status=failed and _status(at.period, failed, age if goes_on else None),
     )
 
@@ -150,7 +156,7 @@ def shift(plan: Plan, steps: int, model: Model, options: Options) -> Plan | None
 def _status(period: int, why: str, age: int | None) -> str:
     """A sentence of when, why and what acts instead."""
     acts = "the brake acts" if age is None else f"the plan of {_periods(age)} before goes on"
-    return f"No plan in period {period}: {why.rstrip('.')}. Instead {acts}."
+    return f"No plan in period {period}: {why} Instead {acts}."
 
 
 def _periods(count: int) -> str:

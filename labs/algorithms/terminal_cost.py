@@ -6,9 +6,8 @@ the sum of (A_K')^i Q_K A_K^i, so that l_f(A_K x) - l_f(x) = -l(x, K x) for ever
 Riccati's P is that of the best K (`riccati.py`; the half changes neither)."""
 
 import numpy as np
-from scipy.linalg import solve_discrete_lyapunov
 
-from labs.errors import LabError
+from labs.algorithms.lyapunov import solve_lyapunov
 
 
 def cost_of_gain(
@@ -16,12 +15,4 @@ def cost_of_gain(
 ) -> np.ndarray:
     """P (n, n), symmetric, of A (n, n), B (n, m), Q (n, n), R (m, m) and K (m, n). Raises LabError
     where K does not stabilise: the sum has no limit."""
-    loop = A + B @ K
-    radius = float(np.abs(np.linalg.eigvals(loop)).max())
-    if not radius < 1.0:
-        raise LabError(
-            f"A + B K has an eigenvalue of magnitude {radius:.6g}: what u = K x costs for ever is "
-            "finite only where all are less than 1"
-        )
-    P = solve_discrete_lyapunov(loop.T, Q + K.T @ R @ K)
-    return np.asarray(0.5 * (P + P.T))
+    return solve_lyapunov(A + B @ K, Q + K.T @ R @ K)

@@ -1,4 +1,4 @@
-"""A mass on a line, the double integrator m p'' = u: regulated by LQR, and by MPC to come."""
+"""A mass on a line, the double integrator m p'' = u: regulated by LQR and by MPC."""
 
 from functools import cache
 

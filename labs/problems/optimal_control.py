@@ -1,5 +1,5 @@
-"""An optimal control problem in discrete time, as the notes' methods take it (2.1.2, 2.4.6): DDP,
-and shooting, collocation and MPC to come.
+"""An optimal control problem in discrete time, as the notes' methods take it (2.1.2, 2.4.6): DDP
+and MPC.
 
     minimise J(U) = sum_(t<N) l(x_t, u_t) + l_f(x_N)   subject to  x_(t+1) = f(x_t, u_t),  x_0 given
 

@@ -13,6 +13,7 @@ from labs.engine.run import World
 from labs.params import Value
 from labs.tasks.direct.picture import joined
 from labs.tasks.direct.player import DirectState
+from tests.labs.solving import solve_to_convergence
 from tests.served import Served
 from tests.viser_client import SceneClient, message
 
@@ -29,7 +30,7 @@ def target_to_motion() -> None:
     path of the UR5's new motion: the same, bit for bit, as a world beside it finds from the same
     changes. At most 300 ms (median), with 30 scene messages a second in every solve."""
     twin = World(find(LAB), REACH)
-    _solve(twin)
+    solve_to_convergence(twin)
     with (
         Served() as server,
         server.session(LAB, params=dict(REACH)) as session,
@@ -45,7 +46,7 @@ def target_to_motion() -> None:
             angle = 2.0 * math.pi * k / MOVES
             place = (0.4 + 0.1 * math.sin(angle), -0.25 - 0.1 * math.cos(angle), 0.25)
             twin.change(twin.lab.edit(twin.params, "target", place))
-            iterations.append(_solve(twin))
+            iterations.append(solve_to_convergence(twin))
             path = _on_the_wire(twin)
             scene.skip(0.3 + 0.001 * (k % 37))  # not in step with the frames
             begin, frames = time.perf_counter(), 0
@@ -70,15 +71,6 @@ def _window(scene: SceneClient) -> bytes:
     found = scene.socket.recv(20.0)
     assert isinstance(found, bytes)
     return found
-
-
-def _solve(world: World) -> int:
-    """To the end; how many iterations it took."""
-    while world.solving:
-        world.iterate()
-    assert world.latest is not None
-    assert world.latest.done.startswith("Converged")
-    return world.latest.iteration
 
 
 def _on_the_wire(world: World) -> bytes:

@@ -10,6 +10,7 @@ from labs.engine.catalog import find
 from labs.engine.run import World
 from labs.optimal_control.ddp.lab import DdpState
 from labs.params import Knob, Value
+from tests.labs.solving import solve_to_convergence
 from tests.served import Served
 from tests.viser_client import SceneClient
 
@@ -25,7 +26,7 @@ def weight_to_motion() -> None:
     twin = World(find("ddp"), REACH)
     knob = twin.params.tunables["control"]
     assert isinstance(knob, Knob)
-    _solve(twin)
+    solve_to_convergence(twin)
     with (
         Served() as server,
         server.session("ddp", params=REACH) as session,
@@ -37,7 +38,7 @@ def weight_to_motion() -> None:
         for k in range(MOVES):
             weight = knob.nearest(0.3 + 0.02 * k if k % 2 else 1.5 + 0.02 * k)
             twin.change({"control": weight})
-            iterations.append(_solve(twin))
+            iterations.append(solve_to_convergence(twin))
             path = _on_the_wire(twin)
             scene.skip(0.2 + 0.001 * (k % 37))  # not in step with the frames
             begin = time.perf_counter()
@@ -50,15 +51,6 @@ def weight_to_motion() -> None:
         f"{max(iterations)} iterations: median {1e3 * statistics.median(times):.1f} ms, "
         f"p95 {1e3 * statistics.quantiles(times, n=20)[-1]:.1f} ms, most {1e3 * max(times):.1f} ms"
     )
-
-
-def _solve(world: World) -> int:
-    """To the end; how many iterations it took."""
-    while world.solving:
-        world.iterate()
-    assert world.latest is not None
-    assert world.latest.done.startswith("Converged")
-    return world.latest.iteration
 
 
 def _on_the_wire(world: World) -> bytes:

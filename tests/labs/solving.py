@@ -26,6 +26,13 @@ def solve(world: World) -> int:
     return world.latest.iteration
 
 
+def solve_to_convergence(world: World) -> int:
+    """The same, where the solver says that it has converged."""
+    iterations = solve(world)
+    assert done(world).startswith("Converged")
+    return iterations
+
+
 def done(world: World) -> str:
     """Why the solver stopped."""
     assert world.latest is not None

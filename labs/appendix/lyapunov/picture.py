@@ -5,13 +5,13 @@ from functools import lru_cache
 
 import numpy as np
 
+from labs.appendix.lyapunov.contours import level_lines
 from labs.appendix.lyapunov.params import LyapunovParams
 from labs.appendix.lyapunov.plots import relative_change
 from labs.appendix.lyapunov.runs import Runs
 from labs.appendix.lyapunov.study import NODES, Study, interpolated
 from labs.colors import NO_VALUE, from_oklab, to_oklab
 from labs.scene import Color, Scene
-from labs.tasks.phase_plane.contours import level_lines
 from labs.tasks.phase_plane.picture import LAYER, PhasePlane
 
 FALLS = ((0.82, 0.92, 0.90), (0.10, 0.45, 0.46))

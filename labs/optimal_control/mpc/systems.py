@@ -10,6 +10,7 @@ from labs.models.discrete import Discrete
 from labs.models.mechanisms import Mechanism, mechanism
 from labs.shapes import Vector3
 from labs.tasks.direct.systems import reaching_posture
+from labs.tasks.motion.motions import FAR_VIEW, MOTIONS, ROBOT_VIEW
 
 ROD, HINGE = 0.5, 1.25
 """Length of each rod of the double pendulum, height of its hinge [m]."""
@@ -54,7 +55,8 @@ class System:
 def system(name: str) -> System:
     """The one of this name, a key of TITLES."""
     body = mechanism(name)
-    title, u_0, q_limited, v_limited, shown, method, camera = _SYSTEMS[name]
+    title, q_limited, v_limited, shown, method, camera = _SYSTEMS[name]
+    u_0 = MOTIONS[name].control_scale
     x0 = np.concatenate([body.arm.home, np.zeros(body.nq)])
     limited = np.array(q_limited), np.array(v_limited)
     return System(title, body, x0, np.array(u_0), *limited, shown, method, camera)
@@ -88,7 +90,6 @@ _SYSTEMS: Mapping[
     str,
     tuple[
         str,
-        tuple[float, ...],
         tuple[bool, ...],
         tuple[bool, ...],
         int,
@@ -98,16 +99,14 @@ _SYSTEMS: Mapping[
 ] = {
     "ur5": (
         "UR5, reaching",
-        (150.0, 150.0, 150.0, 28.0, 28.0, 28.0),
         (True,) * 6,
         (True,) * 6,
         0,
         "semi-implicit-euler",
-        ((1.15, -0.85, 0.8), (0.22, -0.02, 0.33)),
+        ROBOT_VIEW,
     ),
     "cart-pole": (
         "Cart-pole, swinging up",
-        (20.0,),
         (True, False),
         (True, False),
         1,
@@ -116,12 +115,11 @@ _SYSTEMS: Mapping[
     ),
     "double-pendulum": (
         "Double pendulum",
-        (19.62, 4.905),
         (False, True),
         (True, True),
         0,
         "rk4",
-        ((2.6, 1.0, 1.5), (0.0, 0.0, 1.2)),
+        FAR_VIEW,
     ),
 }
 TITLES: Mapping[str, str] = {name: entry[0] for name, entry in _SYSTEMS.items()}

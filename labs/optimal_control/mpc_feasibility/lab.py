@@ -260,33 +260,19 @@ def _plan(params: MpcFeasibilityParams, state: MpcFeasibilityState) -> MpcFeasib
             brake,
         )
     )
-    plan, guess = at.plan, at.guess
-    # Wall-clock times are no part of a run, nor is a cost that is not a number.
-    at = replace(
-        at,
-        plan=plan and replace(plan, seconds={}),
-        guess=guess and replace(guess, cost=0.0),
-    )
-    failed = at.status
-    if soft and not failed and plan is not None and plan.violation > 0.0:
-        failed = plan.message
-    if not failed:
+    status, why = at.status, at.why
+    if soft and not status and at.plan is not None and at.plan.violation > 0.0:
+        status = why = at.plan.message
+    if not status:
         return replace(state, controller=at)
     first = state.failed < 0
     return replace(
         state,
-        controller=replace(at, status=failed),
+        controller=replace(at, status=status),
         failures=state.failures + 1,
         failed=at.period - 1 if first else state.failed,
-        why=_reason(failed) if first else state.why,
+        why=why if first else state.why,
     )
-
-
-def _reason(status: str) -> str:
-    """The part of a status that says why."""
-    if status.startswith("Softened"):
-        return status
-    return status.split(": ", 1)[-1].split(" Instead ")[0]
 
 
 def _ending(params: MpcFeasibilityParams, state: MpcFeasibilityState) -> str:

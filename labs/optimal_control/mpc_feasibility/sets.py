@@ -140,14 +140,7 @@ def growth(setup: Setup) -> Iterator[tuple[Growth, str] | None]:
     step = admissible_set.init(limits)
     polygons, J = [vertices(step.set) + at.goal], np.zeros((0, len(LIMITS)))
     while not step.done:
-        pieces = admissible_set.step_in_pieces(at.loop, limits, step)
-        while True:
-            try:
-                next(pieces)
-            except StopIteration as end:
-                step = end.value
-                break
-            yield None
+        step = yield from admissible_set.step_in_pieces(at.loop, limits, step)
         J = np.vstack([J, step.J])
         if not step.done:
             polygons.append(vertices(step.set) + at.goal)

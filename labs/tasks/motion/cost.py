@@ -1,5 +1,5 @@
-"""The cost of a motion, in DDP and in shooting, collocation and MPC to come: quadratic in state and
-control, and where the tip ends.
+"""The cost of a motion, in DDP and in the direct methods: quadratic in state and control, and where
+the tip ends.
 
     J = sum_(t<N) (x_t - x_ref)' Q (x_t - x_ref) + (u_t - u_ref)' R (u_t - u_ref)
         + (x_N - x_ref)' Q_f (x_N - x_ref) + rho |p(q_N) - p*|^2

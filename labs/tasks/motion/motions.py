@@ -1,5 +1,5 @@
-"""Motions to plan, by DDP and by shooting, collocation and MPC to come: a swing-up of every
-pendulum, and a reach of the UR5.
+"""Motions to plan, by DDP, by the direct methods and by MPC: a swing-up of every pendulum, and a
+reach of the UR5.
 
 A mechanism starts at rest at x_0 and should end at rest at a goal: a posture q* (swing-ups), or
 a place p* of its tip (the reach). Over N steps of h [s], with u_0 a natural size of the controls,

@@ -1,25 +1,6 @@
-"""What of a polygon or of a path lies in the window of a phase plane, for labs to come."""
+"""What of a path lies in the window of a phase plane."""
 
 import numpy as np
-
-
-def clip_polygon(vertices: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
-    """(k, 2): the corners of what a convex polygon (n, 2), its corners in order, shares with the
-    box from `lower` to `upper`; (0, 2) where that is nothing."""
-    for axis in (0, 1):
-        for sign, bound in ((1.0, upper[axis]), (-1.0, -lower[axis])):
-            if not len(vertices):
-                return vertices
-            room = bound - sign * vertices[:, axis]
-            after, ahead = np.roll(vertices, -1, axis=0), np.roll(room, -1)
-            kept: list[np.ndarray] = []
-            for a, b, r, s in zip(vertices, after, room, ahead, strict=True):
-                if r >= 0.0:
-                    kept.append(a)
-                if (r > 0.0 > s) or (r < 0.0 < s):
-                    kept.append(a + r / (r - s) * (b - a))
-            vertices = np.array(kept).reshape(-1, 2)
-    return vertices
 
 
 def clip_segments(

@@ -1,4 +1,4 @@
-"""The phase plane in the scene beside the body that moves, for labs to come.
+"""The phase plane in the scene beside the body that moves.
 
     system = plane_system("cart")
     plane = PhasePlane.of(system)                  # standing; .of(system, lying=True) for surfaces
@@ -20,9 +20,11 @@ from typing import Self
 
 import numpy as np
 
+from labs.algorithms.polygons import clip
+from labs.problems.polyhedron import box
 from labs.scene import Color, Scene
 from labs.shapes import BLUE, Vector3
-from labs.tasks.phase_plane.clipping import clip_polygon, clip_segments
+from labs.tasks.phase_plane.clipping import clip_segments
 from labs.tasks.phase_plane.systems import PlaneSystem
 
 LAYER = 0.004
@@ -169,7 +171,7 @@ class PhasePlane:
     ) -> None:
         """A convex set, by its corners (k, 2) in order, k from 0; with an outline of its own
         colour, or of the one given."""
-        corners = clip_polygon(vertices, self.lower, self.upper)
+        corners = clip(vertices, box(self.lower, self.upper))
         if len(corners) >= 3:
             scene.polygon(name, self.place(corners, LAYER * layer), color, opacity)
         edge = outline or (color if isinstance(color, str) else None)

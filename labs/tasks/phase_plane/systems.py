@@ -1,5 +1,5 @@
 """Systems with a plane of states, x = (q, v), for the labs of MPC (notes, 2.5) and of Lyapunov
-functions (B.1) to come: everything about them can be drawn.
+functions (B.1): everything about them can be drawn.
 
     q' = v,    v' = a(q, v, u),    u held over a period T:    x+ = f(x, u)
 
@@ -15,6 +15,8 @@ from functools import cache
 
 import numpy as np
 
+from labs.algorithms.discretisation import linear_step, repeat_held
+from labs.algorithms.integrators import rk4
 from labs.errors import LabError
 from labs.models.arms import Arm
 from labs.models.mass_on_a_line import MASS, mass_on_a_line
@@ -75,27 +77,17 @@ class PlaneSystem:
     def step(self, X: np.ndarray, U: np.ndarray, T: float) -> np.ndarray:
         """f(x, u) (..., 2) of states X (..., 2) under controls U (..., 1) held for `T` [s]."""
         q, v, u = X[..., 0], X[..., 1], U[..., 0]
-        a, h = self.acceleration, STEP
         with np.errstate(all="ignore"):
             for _ in range(_steps(T)):
-                a1 = a(q, v, u)
-                v2 = v + 0.5 * h * a1
-                a2 = a(q + 0.5 * h * v, v2, u)
-                v3 = v + 0.5 * h * a2
-                a3 = a(q + 0.5 * h * v2, v3, u)
-                v4 = v + h * a3
-                a4 = a(q + h * v3, v4, u)
-                q = q + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4)
-                v = v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+                q, v = rk4(lambda q, v: self.acceleration(q, v, u), q, v, STEP)
         return np.stack([q, v], axis=-1)
 
     def linear(self, T: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """A (2, 2), B (2, 1) and c (2,) of `step` at the rest."""
         by_q, by_v = self.slopes(self.x_eq[0])
-        Z = STEP * np.array([[0.0, 1.0, 0.0], [by_q, by_v, self.strength], [0.0, 0.0, 0.0]])
-        one = np.eye(3) + Z @ (np.eye(3) + Z / 2 @ (np.eye(3) + Z / 3 @ (np.eye(3) + Z / 4)))
-        both = np.linalg.matrix_power(one, _steps(T))
-        A, B, x_eq = both[:2, :2], both[:2, 2:], np.array(self.x_eq)
+        a, b = np.array([[0.0, 1.0], [by_q, by_v]]), np.array([[0.0], [self.strength]])
+        A, B = repeat_held(*linear_step("rk4", STEP, a, b), _steps(T))
+        x_eq = np.array(self.x_eq)
         return A, B, x_eq - A @ x_eq - B[:, 0] * self.u_eq
 
     def drawn(self, place: tuple[float, float] = (0.0, 0.0), color: Vector3 = BLUE) -> Arm:

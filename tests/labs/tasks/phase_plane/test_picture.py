@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from labs.tasks.phase_plane.clipping import clip_polygon, clip_segments
-from labs.tasks.phase_plane.contours import level_lines
+from labs.algorithms.polygons import clip
+from labs.appendix.lyapunov.contours import level_lines
+from labs.problems.polyhedron import box
+from labs.tasks.phase_plane.clipping import clip_segments
 from labs.tasks.phase_plane.picture import PhasePlane
 from labs.tasks.phase_plane.systems import PLANE_SYSTEMS, plane_system
 from tests.labs.contract import CheckingScene
@@ -40,12 +42,12 @@ def test_a_polygon_is_cut_to_the_window() -> None:
     for _ in range(40):
         points = RNG.normal(size=(7, 2)) * 2.0
         hull = points[ConvexHull(points).vertices]
-        cut = clip_polygon(hull, LOWER, UPPER)
+        cut = clip(hull, box(LOWER, UPPER))
         some = RNG.uniform(LOWER, UPPER, (300, 2))
         np.testing.assert_array_equal(_inside(some, hull), _inside(some, cut))
         assert (cut >= LOWER - 1e-12).all()
         assert (cut <= UPPER + 1e-12).all()
-    assert clip_polygon(hull + 50.0, LOWER, UPPER).shape == (0, 2)
+    assert clip(hull + 50.0, box(LOWER, UPPER)).shape == (0, 2)
 
 
 def test_segments_are_cut_to_the_window() -> None:

@@ -1,4 +1,4 @@
-"""Level lines of a function of the plane, for labs to come."""
+"""Level lines of a function of the plane."""
 
 import numpy as np
 

@@ -84,7 +84,7 @@ export function around(values, { zero = false } = {}) {
   let high = Math.max(...finite, ...(zero || !finite.length ? [0] : []));
   // A constant does not fill the frame with its rounding.
   const size = Math.max(Math.abs(low), Math.abs(high));
-  if (high - low < 1e-6 * size) [low, high] = [low - 0.5 * size, high + 0.5 * size];
+  if (high - low < 1e-5 * size) [low, high] = [low - 0.5 * size, high + 0.5 * size];
   if (!(high > low)) [low, high] = [low - 1, high + 1];
   const margin = 0.08 * (high - low);
   return [low - margin, high + margin];

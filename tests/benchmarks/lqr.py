@@ -7,8 +7,8 @@ import numpy as np
 
 from labs.algorithms.riccati import prepare, solve
 from labs.optimal_control.lqr.comparison import COMPARED_HORIZONS, compare
+from labs.optimal_control.lqr.linear_systems import linear_system
 from labs.problems.linear_quadratic import LqrProblem
-from labs.tasks.regulation.linear_systems import linear_system
 
 ROUNDS = 101
 

@@ -1,5 +1,4 @@
-"""The tunables of a motion to plan (`labs.tasks.motion.motions`), in DDP and in shooting,
-collocation and MPC to come."""
+"""The tunables of a motion to plan (`labs.tasks.motion.motions`)."""
 
 import numpy as np
 

@@ -1,8 +1,8 @@
 """The tunables of the solver and of the world its plan meets."""
 
 from labs.algorithms.ddp import Options
+from labs.optimal_control.ddp.motion_params import MotionParams
 from labs.params import Group
-from labs.tasks.motion.params import MotionParams
 
 TOLERANCE = 1e-8
 """Of the cost: what a step must promise to be worth taking."""

@@ -10,6 +10,7 @@ from labs.arrays import with_row
 from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.models.plant import Force
 from labs.optimal_control.lqr.comparison import COMPARED_HORIZONS, HORIZON_COUNT, compare
+from labs.optimal_control.lqr.linear_systems import SIMULATION_STEP, LinearSystem
 from labs.optimal_control.lqr.params import LqrParams
 from labs.optimal_control.lqr.picture import clip_norm, draw_regulated
 from labs.optimal_control.lqr.plots import (
@@ -25,7 +26,6 @@ from labs.optimal_control.lqr.regulator import Regulator
 from labs.params import Value
 from labs.problems.linear_quadratic import LqrProblem
 from labs.scene import Scene
-from labs.tasks.regulation.linear_systems import SIMULATION_STEP, LinearSystem
 
 PUSH_STEPS = 20
 """World steps a push lasts: 0.2 s."""

@@ -1,5 +1,4 @@
-"""Systems to regulate (notes, 2.4), by LQR and by linear MPC to come: a mechanism at rest
-somewhere, and what it is nearby.
+"""Systems to regulate (notes, 2.4): a mechanism at rest somewhere, and what it is nearby.
 
 With x = (q, v), dx = x - (q_eq, 0) and du = u - u_eq, where u_eq holds q_eq at rest,
 

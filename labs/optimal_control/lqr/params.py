@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from labs.optimal_control.lqr.linear_systems import LINEAR_SYSTEMS, LinearSystem, linear_system
 from labs.optimal_control.lqr.region_of_attraction import ClosedLoop
 from labs.optimal_control.lqr.regulator import (
     FINAL_WEIGHTS,
@@ -11,7 +12,6 @@ from labs.optimal_control.lqr.regulator import (
     regulator,
 )
 from labs.params import Group, Params
-from labs.tasks.regulation.linear_systems import LINEAR_SYSTEMS, LinearSystem, linear_system
 
 SLIDING = {"system": ["cart-pole", "mass"]}
 TURNING = {"system": ["cart-pole", "pendulum", "ur5"]}

@@ -6,10 +6,10 @@ import numpy as np
 
 from labs.models.coordinates import coordinate_labels
 from labs.optimal_control.lqr.comparison import COMPARED_HORIZONS, HORIZON_COUNT
+from labs.optimal_control.lqr.linear_systems import LinearSystem
 from labs.optimal_control.lqr.region_of_attraction import HALF_WIDTHS, SYSTEM_CODES, grid_axes
 from labs.optimal_control.lqr.regulator import Regulator, last_settled
 from labs.plots import Curves, Line, Matrix, Plot, Readout, TimeSeries, Trace
-from labs.tasks.regulation.linear_systems import LinearSystem
 
 WITH_REGION = {"system": tuple(SYSTEM_CODES)}
 

@@ -22,7 +22,7 @@ from scipy.linalg import solve_discrete_lyapunov
 
 from labs.compiled import compiled
 from labs.models import cart_pole, mass_on_a_line, pendulums
-from labs.tasks.regulation.linear_systems import SIMULATION_STEP, linear_system
+from labs.optimal_control.lqr.linear_systems import SIMULATION_STEP, linear_system
 
 SMALL_ANGLE = 0.1
 """[rad] near enough to the rest for the linear map to hold."""

@@ -16,8 +16,8 @@ import numpy as np
 
 from labs.algorithms.riccati import SteadyState, solve, steady_state, steady_state_directly
 from labs.errors import LabError
+from labs.optimal_control.lqr.linear_systems import LinearSystem, linear_system
 from labs.problems.linear_quadratic import LqrPolicy, LqrProblem
-from labs.tasks.regulation.linear_systems import LinearSystem, linear_system
 
 MAX_RECURSIONS = 20_000
 """Steps of the recursion towards the steady state, at most."""

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
+from labs.optimal_control.lqr.linear_systems import linear_system
 from labs.optimal_control.lqr.params import LqrParams
 from labs.params import Value
-from labs.tasks.regulation.linear_systems import linear_system
 from tests.labs.experiments import Experiments
 from tests.labs.optimal_control.lqr.simulation import (
     LAB,

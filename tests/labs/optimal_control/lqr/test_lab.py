@@ -8,11 +8,11 @@ from labs.engine.run import World
 from labs.lab import Inputs
 from labs.optimal_control.lqr.comparison import HORIZON_COUNT
 from labs.optimal_control.lqr.lab import PUSH_STEPS, Lqr
+from labs.optimal_control.lqr.linear_systems import linear_system
 from labs.optimal_control.lqr.params import LqrParams
 from labs.optimal_control.lqr.region_of_attraction import GRID_POINTS, SYSTEM_CODES
 from labs.plots import field_names, measured
 from labs.scene import NullScene
-from labs.tasks.regulation.linear_systems import linear_system
 from tests.labs.optimal_control.lqr.simulation import (
     LAB,
     deviations,

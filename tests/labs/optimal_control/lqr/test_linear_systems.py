@@ -5,7 +5,7 @@ import pytest
 
 from labs.algorithms.stabilizability import hidden_modes
 from labs.errors import LabError
-from labs.tasks.regulation.linear_systems import LINEAR_SYSTEMS, SIMULATION_STEP, linear_system
+from labs.optimal_control.lqr.linear_systems import LINEAR_SYSTEMS, SIMULATION_STEP, linear_system
 
 PERIODS = (0.01, 0.05, 0.2)
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from labs.optimal_control.lqr.linear_systems import SIMULATION_STEP, linear_system
 from labs.optimal_control.lqr.region_of_attraction import (
     SMALL_ANGLE,
     SYSTEM_CODES,
@@ -12,7 +13,6 @@ from labs.optimal_control.lqr.region_of_attraction import (
     state_derivative,
 )
 from labs.optimal_control.lqr.regulator import RegulatorSettings, regulator
-from labs.tasks.regulation.linear_systems import SIMULATION_STEP, linear_system
 
 WEIGHTS = (10.0, 10.0, 1.0, 1.0)
 

@@ -13,6 +13,7 @@ from pydantic_core import ErrorDetails
 from pydantic_core.core_schema import ValidationInfo
 
 from labs.errors import ParameterError
+from labs.number_texts import LONGEST_NUMBER
 from labs.tunables import Choice, Effect, Group, Knob, Text, Toggle, Tunable, Value, When
 
 __all__ = [
@@ -152,6 +153,6 @@ def _from_text(text: str, tunable: Tunable | None) -> object:
 
 def _number(text: str) -> float | str:
     try:
-        return float(text)
+        return float(text) if len(text) <= LONGEST_NUMBER else text
     except ValueError:
         return text

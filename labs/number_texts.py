@@ -1,0 +1,35 @@
+"""Numbers as people type them into tables, tableaus and matrices, read at a bounded cost.
+
+Exact arithmetic would turn the nine letters of 1e9000000 into a number of nine million digits
+first; here a number is a float from the beginning, and its text is short."""
+
+import contextlib
+import math
+
+LONGEST_NUMBER = 64
+"""Characters: 17 digits tell any float, and a fraction has two."""
+SHOWN = 24
+"""Characters of what is refused that its refusal repeats."""
+
+
+def parse_number(text: str) -> float:
+    """A finite number: a decimal (0.25, -1e-3), a fraction of two (1/4), or per cent of either
+    (25 %); a minus may be the sign of mathematics. Raises ValueError, its message a sentence."""
+    written = text.strip().replace("\u2212", "-")
+    top, per_cent, after = written.partition("%")
+    numerator, slash, denominator = top.partition("/")
+    value = math.nan
+    if len(written) <= LONGEST_NUMBER and not after and "_" not in written:
+        with contextlib.suppress(ValueError, ZeroDivisionError):
+            divisor = float(denominator) if slash else 1.0
+            # Of 1/inf nothing may be left either.
+            value = float(numerator) / divisor if math.isfinite(divisor) else math.nan
+    value /= 100.0 if per_cent else 1.0
+    if not math.isfinite(value):
+        raise ValueError(f"{shorten(text)!r} is no number: write 0.25, 1e-3, 1/4 or 25 %")
+    return value
+
+
+def shorten(text: str) -> str:
+    """What a refusal repeats of a text."""
+    return text if len(text) <= SHOWN else f"{text[: SHOWN - 1]}\u2026"

@@ -1,0 +1,52 @@
+"""Numbers as people type them."""
+
+import pytest
+
+from labs.algorithms.butcher_tableau import parse_tableau
+from labs.errors import LabError
+from labs.number_texts import LONGEST_NUMBER, parse_number
+from labs.reinforcement_learning.markov.chains import parse_rows
+from labs.tasks.mdp_table.table import parse_table
+
+ENDLESS = ["1e9000000", "1e-9000000/1e9000000", "1/1e9000000", "9" * 300, "0." + "3" * 300]
+"""What exact arithmetic would need minutes for, or what no number is that long."""
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("0.25", 0.25),
+        (" 1e-3 ", 1e-3),
+        ("1/3", 1 / 3),
+        ("-2187/6784", -2187 / 6784),
+        ("\u22122", -2.0),
+        ("25 %", 0.25),
+        ("1/4%", 0.0025),
+        ("0." + "3" * (LONGEST_NUMBER - 2), 1 / 3),
+    ],
+)
+def test_a_number_is_read(text: str, value: float) -> None:
+    assert parse_number(text) == value
+
+
+@pytest.mark.parametrize(
+    "text",
+    [*ENDLESS, "", "x", "1/0", "1/2/3", "nan", "inf", "1/inf", "1_0", "%", "5%%", "1e400", "0x10"],
+)
+def test_what_is_no_number_is_refused_at_once_and_shown_in_short(text: str) -> None:
+    with pytest.raises(ValueError, match="is no number: write") as refused:
+        parse_number(text)
+    assert len(str(refused.value)) < 100
+
+
+@pytest.mark.parametrize("number", ENDLESS)
+def test_no_text_of_a_lab_is_read_at_unbounded_cost(number: str) -> None:
+    """Each of these is refused in microseconds; exact arithmetic would run into the time limit."""
+    with pytest.raises(LabError):
+        parse_tableau(f"0 | ; | {number}")
+    with pytest.raises(LabError):
+        parse_table(f"state, cost, A\nA, {number}, 1")
+    with pytest.raises(LabError):
+        parse_table(f'[{{"state": "A", "cost": "{number}", "to": {{"A": 1}}}}]')
+    with pytest.raises(LabError):
+        parse_rows(f"1: {number} {number}")

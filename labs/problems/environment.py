@@ -1,5 +1,5 @@
-"""What deep Q-learning drives (notes, 3.8.3), and function approximation to come: states are
-continuous, controls few.
+"""What deep Q-learning and Gymnasium's learners drive (notes, 3.8.3): states are continuous,
+controls few.
 
     x_(t+1) = f(x_t, u_t),    l(x_t, u_t) is paid,    u_t one of u(0) ... u(nu - 1)
 

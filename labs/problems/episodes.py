@@ -1,5 +1,5 @@
 """What learning from experience consists of, for the compiled loops of model-free control, and of
-Monte Carlo, TD prediction and TD(lambda) to come.
+Monte Carlo, TD prediction and TD(lambda).
 
 An `EpisodicTask` is a finite MDP seen from inside: a learner cannot look at its tables, it only
 starts an episode, applies a control and is told the cost and the next state. An `UpdateRule` says
@@ -19,6 +19,8 @@ from labs.compiled import compiled, inlined
 from labs.problems.finite_mdp import FiniteMDP
 from labs.random_numbers import below, uniform
 
+NO_OUTCOMES = np.zeros((0, 0, 0), np.int32)
+
 
 class EpisodicTask(NamedTuple):
     """A finite MDP and how its episodes begin and end."""
@@ -31,11 +33,13 @@ class EpisodicTask(NamedTuple):
     successor: np.ndarray
     """(X, U) int32, or empty where transitions are random."""
     cumulative: np.ndarray
-    """(U, X, X) sums of P along its rows, or empty where transitions are not random."""
+    """(U, X, K) sums of P along its rows, or empty where transitions are not random."""
     starts: np.ndarray
     """(k,) int64: an episode starts in any of these."""
     horizon: int
     """Steps after which an episode is cut. The state there is not terminal: its value counts."""
+    outcomes: np.ndarray = NO_OUTCOMES
+    """(U, X, K) int32: the states that P is of, or empty where it is of all."""
 
 
 class UpdateRule(NamedTuple):
@@ -85,6 +89,7 @@ def episodic_task(mdp: FiniteMDP, starts: Sequence[int], horizon: int) -> Episod
         cumulative=np.zeros((0, 0, 0)) if certain else mdp.cumulative,
         starts=np.array(starts, np.int64),
         horizon=int(horizon),
+        outcomes=NO_OUTCOMES if mdp.outcomes is None else mdp.outcomes,
     )
 
 
@@ -105,7 +110,8 @@ def transition(task: EpisodicTask, x: int, u: int, random: np.ndarray) -> int:
 
 @compiled
 def _sample(task: EpisodicTask, x: int, u: int, random: np.ndarray) -> int:
-    return int(np.searchsorted(task.cumulative[u, x], uniform(random), "right"))
+    k = np.searchsorted(task.cumulative[u, x], uniform(random), "right")
+    return int(task.outcomes[u, x, k]) if task.outcomes.size else int(k)
 
 
 @inlined

@@ -5,17 +5,22 @@ With X states and U controls, numbered from 0,
     P[u, x, y] = Pr(x_(t+1) = y | x_t = x, u_t = u),    C[x, u] = l(x, u),    gamma in [0, 1],
 
 and V(x) = E[sum over k of gamma^k l(x_k, u_k)] is a cost-to-go: it is minimised. Dynamics are
-either such a P or, where nothing is left to chance, a table y = successor[x, u]. A terminal
-state ends an episode: it leads to itself and costs nothing.
+either such a P or, where nothing is left to chance, a table y = successor[x, u]. Where each control
+leads to K states at most, P may be written for those only, P[u, x, k] that of outcomes[u, x, k].
+A terminal state ends an episode: it leads to itself and costs nothing.
+
+Not every state need have every control: `available` says which it has. The others are there for
+the tables to be full, and do exactly what one of those it has does.
 
 A policy is either (X,) integers, u = pi(x), or (X, U) probabilities pi(u | x).
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from labs.errors import LabError
 
@@ -38,7 +43,11 @@ class FiniteMDP:
     successor: np.ndarray | None = None
     """(X, U) int32: the next state; or else"""
     P: np.ndarray | None = None
-    """(U, X, X) probabilities of the next state."""
+    """(U, X, X) probabilities of the next state, or (U, X, K) of the states in ..."""
+    outcomes: np.ndarray | None = None
+    """(U, X, K) int32; the same state may stand there twice."""
+    available: np.ndarray | None = None
+    """(X, U) bool: which controls a state has; None: all."""
 
     def __post_init__(self) -> None:
         _check_costs(self)
@@ -48,6 +57,12 @@ class FiniteMDP:
             _check_successors(self, self.successor)
         if self.P is not None:
             _check_probabilities(self, self.P)
+        if self.available is not None and not (
+            self.available.shape == self.C.shape and self.available.any(axis=1).all()
+        ):
+            raise LabError(
+                f"available has shape (X, U) = {self.C.shape}: every state has a control"
+            )
 
     @property
     def X(self) -> int:
@@ -72,9 +87,13 @@ class FiniteMDP:
     @cached_property
     def probabilities(self) -> np.ndarray:
         """P (U, X, X), also of a deterministic MDP: for small ones."""
-        if self.P is not None:
+        if self.P is not None and self.outcomes is None:
             return self.P
         P = np.zeros((self.U, self.X, self.X))
+        if self.P is not None and self.outcomes is not None:
+            at = np.indices(self.P.shape)
+            np.add.at(P, (at[0], at[1], self.outcomes), self.P)
+            return P
         for u, y in enumerate(self.successors.T):
             P[u, np.arange(self.X), y] = 1.0
         return P
@@ -86,24 +105,52 @@ class FiniteMDP:
             raise LabError("this MDP leaves the next state to chance: it has no successor table")
         return self.successor
 
+    def expect(self, V: np.ndarray) -> np.ndarray:
+        """(X, U): E[V(x') | x, u], V (X,) finite."""
+        if self.successor is not None:
+            return np.asarray(V[self.successor])
+        assert self.P is not None
+        if self.outcomes is None:
+            return np.asarray((self.P @ V).T)
+        return np.asarray(np.einsum("uxk,uxk->xu", self.P, V[self.outcomes]))
+
     @cached_property
     def cumulative(self) -> np.ndarray:
-        """(U, X, X) sums of P along each row, for sampling: with r uniform in [0, 1), the next
-        state is the first y with r < cumulative[u, x, y]. From the last y on that can be next
-        the sums are exactly 1."""
-        sums: np.ndarray = np.cumsum(self.probabilities, axis=2)
-        last = self.X - 1 - (self.probabilities[..., ::-1] > 0.0).argmax(axis=2)
-        sums[np.arange(self.X) >= last[..., None]] = 1.0
+        """(U, X, K) sums of P along each row, for sampling: with r uniform in [0, 1), the next
+        state is the first y (of the outcomes) with r < cumulative[u, x, y]. From the last y on
+        that can be next the sums are exactly 1."""
+        P = self.probabilities if self.P is None else self.P
+        sums: np.ndarray = np.cumsum(P, axis=2)
+        last = P.shape[2] - 1 - (P[..., ::-1] > 0.0).argmax(axis=2)
+        sums[np.arange(P.shape[2]) >= last[..., None]] = 1.0
         return sums
+
+    def sample(self, x: int, u: int, random: Callable[[], float]) -> int:
+        """The next state; `random` draws evenly from [0, 1), once where chance has a say."""
+        if self.successor is not None:
+            return int(self.successor[x, u])
+        k = int(np.searchsorted(self.cumulative[u, x], random(), side="right"))
+        return k if self.outcomes is None else int(self.outcomes[u, x, k])
 
     def transition_matrix(self, policy: np.ndarray) -> np.ndarray:
         """P^pi (X, X): of the Markov chain that remains under a policy."""
         weights = self._weights(policy)
+        if self.P is not None and self.outcomes is not None:
+            return np.asarray(self.sparse_chain(policy).toarray())
         if self.successor is None:
             return np.asarray(np.einsum("xu,uxy->xy", weights, self.probabilities))
         matrix = np.zeros((self.X, self.X))
         np.add.at(matrix, (np.arange(self.X)[:, None], self.successor), weights)
         return matrix
+
+    def sparse_chain(self, policy: np.ndarray) -> csr_array:
+        """The same (X, X), of an MDP with outcomes, where most of it is 0."""
+        assert self.P is not None
+        assert self.outcomes is not None
+        x = np.indices(self.P.shape)[1]
+        share = self.P * self._weights(policy).T[:, :, None]
+        some = share > 0.0
+        return csr_array((share[some], (x[some], self.outcomes[some])), shape=(self.X, self.X))
 
     def policy_cost(self, policy: np.ndarray) -> np.ndarray:
         """C^pi (X,): the expected cost of one step under a policy."""
@@ -122,9 +169,11 @@ class FiniteMDP:
         found[list(starts)] = True
         fresh = found
         while fresh.any():
+            ahead: np.ndarray = np.zeros(self.X, bool)
             if self.successor is not None:
-                ahead: np.ndarray = np.zeros(self.X, bool)
                 ahead[self.successor[fresh]] = True
+            elif self.P is not None and self.outcomes is not None:
+                ahead[self.outcomes[:, fresh][self.P[:, fresh] > 0.0]] = True
             else:
                 ahead = np.any(self.probabilities[:, fresh] > 0.0, axis=(0, 1))
             fresh = ahead & ~found
@@ -139,7 +188,7 @@ class FiniteMDP:
             if self.successor is not None:
                 leads = found[self.successor].any(axis=1)
             else:
-                leads = (self.probabilities @ found > 0.0).any(axis=0)
+                leads = (self.expect(found.astype(float)) > 0.0).any(axis=1)
             if not (leads & ~found).any():
                 return found
             found |= leads
@@ -165,8 +214,10 @@ class FiniteMDP:
 
 
 def random_policy(mdp: FiniteMDP) -> np.ndarray:
-    """(X, U): every control alike."""
-    return np.full((mdp.X, mdp.U), 1.0 / mdp.U)
+    """(X, U): every control a state has alike."""
+    if mdp.available is None:
+        return np.full((mdp.X, mdp.U), 1.0 / mdp.U)
+    return np.asarray(mdp.available / mdp.available.sum(axis=1, keepdims=True))
 
 
 def _check_costs(mdp: FiniteMDP) -> None:
@@ -209,11 +260,15 @@ def _check_successors(mdp: FiniteMDP, table: np.ndarray) -> None:
 
 
 def _check_probabilities(mdp: FiniteMDP, P: np.ndarray) -> None:
-    if P.shape != (mdp.U, mdp.X, mdp.X):
+    ahead = np.arange(mdp.X) if mdp.outcomes is None else mdp.outcomes
+    if P.shape != (mdp.U, mdp.X, ahead.shape[-1]) or ahead.shape not in (P.shape, P.shape[2:]):
         raise LabError(f"P has shape (U, X, X) = {(mdp.U, mdp.X, mdp.X)}; given: {P.shape}")
+    if ((ahead < 0) | (ahead >= mdp.X)).any():
+        raise LabError(f"outcomes holds {ahead.min()} to {ahead.max()}: states below {mdp.X} go")
     wrong = np.argwhere(~(P >= 0.0))
     if len(wrong):
-        u, x, y = wrong[0]
+        u, x, k = wrong[0]
+        y = np.broadcast_to(ahead, P.shape)[u, x, k]
         raise LabError(
             f"from state {x} to state {y} under control {u} the probability is {P[u, x, y]:g}: "
             "it must be a number from 0 to 1"
@@ -227,8 +282,8 @@ def _check_probabilities(mdp: FiniteMDP, P: np.ndarray) -> None:
             "each row must sum to 1"
         )
     ends = np.flatnonzero(mdp.terminal)
-    out = P[:, ends] > 0.0  # not "but for rounding": whoever can leave does so in the end
-    out[:, np.arange(len(ends)), ends] = False
+    # Not "but for rounding": whoever can leave does so in the end.
+    out = (P[:, ends] > 0.0) & (np.broadcast_to(ahead, P.shape)[:, ends] != ends[:, None])
     left = np.argwhere(out.any(axis=2))
     if len(left):
         u, i = left[0]

@@ -1,5 +1,5 @@
 """Prediction: what a given policy costs, learned from its episodes (notes, 3.5), for the labs of
-prediction, TD(lambda) and function approximation to come.
+prediction, TD(lambda) and function approximation.
 
 A `PredictionTask` is an episodic task together with the policy that is followed. What is learned
 has no say in what happens, so that an episode

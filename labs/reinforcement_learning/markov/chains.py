@@ -9,7 +9,8 @@ from functools import cache
 import numpy as np
 
 from labs.errors import LabError
-from labs.reinforcement_learning.markov.tables import Table, parse_table
+from labs.number_texts import parse_number
+from labs.tasks.mdp_table.table import Table, parse_table
 
 STUDENT = """state,    cost, Lecture, Exercise, Code, Café, Phone, Sleep
 Lecture,  -1,   0,       0.6,      0,    0.1,  0.3,   0
@@ -83,7 +84,7 @@ def random_chain(states: int, number: int) -> Table:
         P[x, rng.choice(states, 2, replace=False)] += rng.uniform(0.0, 1.0, 2)
     P /= P.sum(axis=1, keepdims=True)
     costs = rng.integers(-3, 4, size=(states, 1)).astype(float)
-    return Table(tuple(f"S{x + 1}" for x in here), ("",), P[None], costs)
+    return Table(tuple(f"S{x + 1}" for x in here), ("",), P[None], costs, np.zeros_like(costs, int))
 
 
 def parse_rows(text: str) -> dict[int, np.ndarray]:
@@ -93,7 +94,7 @@ def parse_rows(text: str) -> dict[int, np.ndarray]:
     for line in filter(str.strip, text.splitlines()):
         number, colon, entries = line.partition(":")
         try:
-            x, weights = int(number) - 1, np.array([float(entry) for entry in entries.split()])
+            x, weights = int(number) - 1, np.array(list(map(parse_number, entries.split())))
         except ValueError:
             x, weights = -1, np.zeros(0)
         sound = weights.any() and ((weights >= 0.0) & (weights <= MAX_WEIGHT)).all()

@@ -16,7 +16,8 @@ CANCELLED = 1e-12
 
 def about_chain(process: RewardProcess, source: int, target: int) -> str:
     """The structure of P, and whether it can be edited; a paragraph a line."""
-    return "\n".join(filter(None, [*structure(process), edits(process, source, target)]))
+    about = [*structure(process), *process.table.notes, edits(process, source, target)]
+    return "\n".join(filter(None, about))
 
 
 def about_value(process: RewardProcess, gamma: float) -> str:

@@ -9,7 +9,7 @@ from labs.errors import LabError
 from labs.params import Group, Params
 from labs.reinforcement_learning.markov.chains import TITLES, chain_table, parse_rows
 from labs.reinforcement_learning.markov.reward_process import Edit, RewardProcess, reward_process
-from labs.reinforcement_learning.markov.tables import parse_table
+from labs.tasks.mdp_table.table import parse_table
 
 MAX_SHOWN_STATES = 12
 """States that a circle and a chooser still hold."""
@@ -43,8 +43,8 @@ class MarkovParams(Params):
         max_length=4000,
         when={"chain": "table"},
     )
-    """CSV: a heading (state, control if any, cost, the states), then a row
-    each; or JSON: [{"state": "A", "cost": 1, "to": {"A": 1}}]."""
+    """CSV: a heading (state, control if any, cost, the states), then a row each, or from, to,
+    probability, cost; or JSON: [{"state": "A", "cost": 1, "to": {"A": 1}}]; or a file of such."""
     source: str = PROBABILITIES.choice("1", NUMBERS, "From state", key=True)
     """Whose beads lie on its ribbons; a click on a state's tile chooses it, too."""
     target: str = PROBABILITIES.choice("2", NUMBERS, "To state", key=True, when=EDITABLE)

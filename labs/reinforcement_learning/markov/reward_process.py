@@ -16,7 +16,7 @@ from labs.algorithms.markov_chain import (
 )
 from labs.reinforcement_learning.markov.chains import shift_probability, with_probability, with_rows
 from labs.reinforcement_learning.markov.graph import probability_at, state_places
-from labs.reinforcement_learning.markov.tables import Table
+from labs.tasks.mdp_table.table import Table
 
 
 @dataclass(frozen=True)

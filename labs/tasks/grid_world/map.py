@@ -2,34 +2,52 @@
 
 A map is written a row a line, the top row first:
 
-    #  wall     .  free     S  start     G  goal (terminal)     C  cliff
+    #  wall     .  free     S  start     G  goal     H  hole     C  cliff     +  -  ends, see below
 
 and may end in a line of digits, one a column: the wind, in cells upwards for each step taken
-from that column. A step costs 1. Stepping off the edge or into a wall leads nowhere: the part of
-the step along the row comes first, then the part along the column with the wind added, each a
-cell at a time. A fall off the cliff costs FALL and leads back to the start. With `slip` > 0 the
-wanted control is replaced with that probability by one of all controls, drawn evenly.
+from that column. Stepping off the edge or into a wall leads nowhere: the part of the step along
+the row comes first, then the part along the column with the wind added, each a cell at a time.
+
+A step costs `living`, 1 unless said otherwise, and what the cell costs that it leads to: nothing,
+but for + (a reward of 1), - (a cost of 1), H (FALL) and what the map says in lines below it, see
+`reading.py`. G, H, + and - are ends. A fall off the cliff costs FALL in all and leads back to the
+start. With slip, the wanted control is replaced with that probability by one of all controls, drawn
+evenly, or, `sideways`, by one of the two at right angles to it.
 
 Named maps: the 4x4 world, the cliff and the windy world of Sutton and Barto (Reinforcement
-Learning, 2nd edition, examples 4.1, 6.6 and 6.5), and a room with walls. States are the cells
-that are neither wall nor cliff, numbered along the rows.
+Learning, 2nd edition, examples 4.1, 6.6 and 6.5), a room with walls, the 4 x 3 world of Russell
+and Norvig (Artificial Intelligence, chapter on complex decisions), and the two of Gymnasium's
+FrozenLake. States are the cells that are neither wall nor cliff, numbered along the rows.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 
 from labs.errors import LabError
 from labs.problems.finite_mdp import FiniteMDP
+from labs.tasks.grid_world.cells import CellWorld
+from labs.tasks.grid_world.reading import Kind, read_map
 
-KINDS: Mapping[str, str] = {"#": "wall", ".": "free", "S": "start", "G": "goal", "C": "cliff"}
+KINDS: Mapping[str, str] = {
+    "#": "wall",
+    ".": "free",
+    "S": "start",
+    "G": "goal",
+    "H": "hole",
+    "C": "cliff",
+    "+": "reward 1",
+    "-": "cost 1",
+}
+ENDS = "GH+-"
 MOVES = np.array([[-1, 0], [0, 1], [1, 0], [0, -1], [-1, 1], [1, 1], [1, -1], [-1, -1]])
 """(row, column) of each control: up, right, down, left; then the king's diagonals."""
 STEP, FALL = 1.0, 100.0
-"""Costs."""
-SIDE = 16
+"""Costs, unless said otherwise."""
+COSTS: Mapping[str, float] = {"+": -1.0, "-": 1.0, "H": FALL, "C": FALL}
+SIDE = 32
 """Rows and columns at most."""
 
 MAPS: Mapping[str, str] = {
@@ -39,44 +57,49 @@ MAPS: Mapping[str, str] = {
     "0001112210",
     "room": "S....#......\n.....#......\n.....#......\n.....#..###.\n........#...\n"
     ".....#..#...\n.....#..#..G\n.....#..#...",
+    "4x3": "...+\n.#.-\nS...",
+    "frozen lake": "SFFF\nFHFH\nFFFH\nHFFG\nG = reward 1\nH = cost 0",
+    "frozen lake 8x8": "SFFFFFFF\nFFFFFFFF\nFFFHFFFF\nFFFFFHFF\nFFFHFFFF\nFHHFFFHF\nFHFFHFHF\n"
+    "FFFHFFFG\nG = reward 1\nH = cost 0",
 }
 
 
 @dataclass(frozen=True)
-class GridWorld:
+class GridWorld(CellWorld):
     """A map, and its states as cells."""
 
     rows: tuple[str, ...]
-    """The characters of KINDS, all rows of one length."""
+    """The characters of KINDS and of the legend, all rows of one length."""
     wind: tuple[int, ...]
     """For each column [cells]."""
     kings: bool = False
     """Whether the diagonals are controls too: 8 instead of 4."""
+    legend: tuple[tuple[str, Kind], ...] = ()
+    """What the map says of letters."""
+    notes: tuple[str, ...] = field(default=(), compare=False)
+    """What was understood otherwise than written, in sentences."""
 
     @classmethod
     def parse(cls, text: str, kings: bool = False) -> "GridWorld":
         """The world of a map. Raises LabError, naming the row."""
-        rows = [line.strip() for line in text.strip().splitlines()]
-        wind: tuple[int, ...] = ()
-        if rows and rows[-1].isdecimal():
-            wind = tuple(map(int, rows.pop()))
+        found = read_map(text, KINDS, ENDS)
+        rows = found.rows
         if not rows:
             raise LabError("a map has at least one row of cells")
         width = len(rows[0])
-        wind = wind or (0,) * width
+        wind = found.wind or (0,) * width
         for number, row in enumerate(rows, 1):
             if len(row) != width:
                 raise LabError(
                     f"row {number} of the map, {row!r}, has {len(row)} cells and the first "
                     f"{width}: all rows are of one length"
                 )
-            strange = sorted(set(row) - set(KINDS))
-            if strange:
-                known = ", ".join(f"{sign} {word}" for sign, word in KINDS.items())
-                raise LabError(f"row {number} of the map has {strange[0]!r}: there are {known}")
         if len(wind) != width:
             raise LabError(f"the wind has {len(wind)} digits: one for each of {width} columns goes")
-        return cls(tuple(rows), wind, kings)._checked()
+        notes, legend = found.notes, tuple(found.legend.items())
+        if "H" in "".join(rows) and "H" not in found.legend:
+            notes += (f"A hole H ends an episode and costs {FALL:g}; H = cost 0 below the map: 0.",)
+        return cls(tuple(rows), wind, kings, legend, notes)._checked()
 
     def _checked(self) -> "GridWorld":
         cells = "".join(self.rows)
@@ -84,8 +107,8 @@ class GridWorld:
             raise LabError(f"a map of {self.shape} cells is too large: {SIDE} x {SIDE} at most")
         if cells.count("S") > 1:
             raise LabError(f"the map has {cells.count('S')} starts S: one at most")
-        if "G" not in cells:
-            raise LabError("the map has no goal G: at least one goes")
+        if not any(map(self.ends, cells)):
+            raise LabError("the map has no goal G, nor another end: at least one goes")
         if "C" in cells and "S" not in cells:
             raise LabError("the map has a cliff C but no start S for whoever falls to return to")
         return self
@@ -98,8 +121,19 @@ class GridWorld:
     @property
     def text(self) -> str:
         """The map as it is written."""
-        lines = [*self.rows, "".join(map(str, self.wind))] if any(self.wind) else self.rows
-        return "\n".join(lines)
+        wind = ["".join(map(str, self.wind))] if any(self.wind) else []
+        said = [_write_kind(sign, kind) for sign, kind in self.legend]
+        return "\n".join([*self.rows, *wind, *said])
+
+    def ends(self, sign: str) -> bool:
+        """Whether an episode ends in cells of this kind."""
+        kind = dict(self.legend).get(sign)
+        return kind.ends if kind else sign in ENDS
+
+    def cost(self, sign: str) -> float:
+        """Of a step into a cell of this kind, beside that of any step; of a fall in all."""
+        kind = dict(self.legend).get(sign)
+        return kind.cost if kind else COSTS.get(sign, 0.0)
 
     def with_cell(self, row: int, column: int, kind: str) -> "GridWorld":
         """The world with one cell of another kind; a new start takes the place of the old one,
@@ -119,77 +153,92 @@ class GridWorld:
     @cached_property
     def cells(self) -> np.ndarray:
         """(X, 2) int: (row, column) of each state."""
-        return np.argwhere(np.isin([list(row) for row in self.rows], list(".SG")))
-
-    @cached_property
-    def index(self) -> np.ndarray:
-        """(rows, columns) int: the state of each cell, -1 for walls and the cliff."""
-        index = np.full(self.shape, -1)
-        index[tuple(self.cells.T)] = np.arange(len(self.cells))
-        return index
-
-    def state(self, cell: Sequence[int] | np.ndarray) -> int:
-        """The state of a cell (row, column), on the map or beside it; -1 where there is none."""
-        row, column = map(int, cell)
-        rows, columns = self.shape
-        inside = 0 <= row < rows and 0 <= column < columns
-        return int(self.index[row, column]) if inside else -1
+        return np.argwhere(~np.isin([list(row) for row in self.rows], list("#C")))
 
     @cached_property
     def terminal(self) -> np.ndarray:
-        """(X,) bool: the goals."""
-        return np.array([self.kind(x) == "G" for x in range(len(self.cells))])
+        """(X,) bool: the ends."""
+        return np.array([self.ends(self.kind(x)) for x in range(len(self.cells))])
+
+    @cached_property
+    def goals(self) -> np.ndarray:
+        """(X,) bool: the ends that cost least."""
+        costs = np.array([self.cost(self.kind(x)) for x in range(len(self.cells))])
+        costs -= [self.kind(x) == "G" for x in range(len(self.cells))]  # a goal before a hole
+        least = costs[self.terminal].min()
+        return np.asarray(self.terminal & (costs == least))
 
     @cached_property
     def start(self) -> int:
-        """The state where an episode begins: S, or where there is none the first that is not a
-        goal."""
+        """The state where an episode begins: S, or where there is none the first that is no end."""
         kinds = [self.kind(state) for state in range(len(self.cells))]
-        return kinds.index("S") if "S" in kinds else kinds.index(".") if "." in kinds else 0
+        return kinds.index("S") if "S" in kinds else int(np.argmin(self.terminal))
 
     def kind(self, state: int) -> str:
         """The character of a state's cell."""
         row, column = map(int, self.cells[state])
         return self.rows[row][column]
 
-    def on_map(self, values: np.ndarray, fill: float = 0.0) -> np.ndarray:
-        """(rows, columns): `values` (X,) of the states, laid out; `fill` elsewhere."""
-        laid = np.full(self.shape, fill)
-        laid[tuple(self.cells.T)] = values
-        return laid
-
     @cached_property
     def table(self) -> tuple[np.ndarray, np.ndarray]:
-        """Without slip: successors (X, U) int32 and costs (X, U)."""
+        """Without slip: successors (X, U) int32 and costs (X, U), that of a step being STEP."""
+        return self.nominal, self._costs(STEP)
+
+    @property
+    def nominal(self) -> np.ndarray:
+        """(X, U) int32: the next state without slip."""
+        return self._steps[0]
+
+    @cached_property
+    def _steps(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Without slip: successors (X, U) int32, the cost (X, U) of the cells they are in, and
+        whether it is a fall (X, U)."""
         X, U = len(self.cells), len(self.moves)
-        successor, cost = np.empty((X, U), np.int32), np.full((X, U), STEP)
+        successor, cost = np.empty((X, U), np.int32), np.zeros((X, U))
+        fall = np.zeros((X, U), bool)
         for x in range(X):
+            if self.terminal[x]:
+                successor[x] = x
+                continue
             for u in range(U):
                 row, column = self._land(x, u)
-                if self.rows[row][column] == "C":
-                    successor[x, u], cost[x, u] = self.start, FALL
-                else:
-                    successor[x, u] = self.index[row, column]
-            if self.kind(x) == "G":
-                successor[x], cost[x] = x, 0.0
-        return successor, cost
+                sign = self.rows[row][column]
+                fall[x, u], cost[x, u] = sign == "C", self.cost(sign)
+                successor[x, u] = self.start if sign == "C" else self.index[row, column]
+        return successor, cost, fall
 
-    def mdp(self, gamma: float, slip: float = 0.0) -> FiniteMDP:
+    def _costs(self, living: float) -> np.ndarray:
+        """(X, U) without slip."""
+        _, cost, fall = self._steps
+        costs = np.where(fall, cost, living + cost)
+        costs[self.terminal] = 0.0
+        return costs
+
+    def mdp(
+        self, gamma: float, slip: float = 0.0, sideways: bool = False, living: float = STEP
+    ) -> FiniteMDP:
         """The world as an MDP; with slip in (0, 1] its dynamics are probabilities."""
-        successor, cost = self.table
-        X, U = cost.shape
+        successor, cost = self.nominal, self._costs(living)
+        U = cost.shape[1]
         if not slip:
             return FiniteMDP(cost, gamma, self.terminal, successor=successor)
-        P = np.zeros((U, X, X))
-        for u in range(U):
-            np.add.at(P[u], (np.arange(X), successor[:, u]), 1.0 - slip)
-            for other in range(U):
-                np.add.at(P[u], (np.arange(X), successor[:, other]), slip / U)
-        mixed = (1.0 - slip) * cost + slip * cost.mean(axis=1, keepdims=True)
-        return FiniteMDP(mixed, gamma, self.terminal, P=P)
+        u = np.arange(U)
+        others = np.tile(u, (U, 1))
+        if sideways:
+            around = u // 4 * 4  # the diagonals are at right angles to one another
+            others = np.stack([around + (u + 1) % 4, around + (u + 3) % 4], axis=1)
+        happens = np.hstack([u[:, None], others])
+        p = np.full(happens.shape, slip / others.shape[1])
+        p[:, 0] = 1.0 - slip
+        outcomes = successor[:, happens].transpose(1, 0, 2)
+        order = outcomes.argsort(axis=2, kind="stable")
+        P = np.broadcast_to(p[:, None], outcomes.shape)
+        P, outcomes = (np.take_along_axis(of, order, axis=2) for of in (P, outcomes))
+        mixed = (cost[:, happens] * p).sum(axis=2)
+        return FiniteMDP(mixed, gamma, self.terminal, P=P, outcomes=outcomes)
 
     def _land(self, x: int, u: int) -> tuple[int, int]:
-        """The cell where a step ends."""
+        """The cell where a step leads."""
         row, column = map(int, self.cells[x])
         down, right = map(int, self.moves[u])
         down -= self.wind[column]
@@ -204,6 +253,12 @@ class GridWorld:
     def _open(self, row: int, column: int) -> bool:
         rows, columns = self.shape
         return 0 <= row < rows and 0 <= column < columns and self.rows[row][column] != "#"
+
+
+def _write_kind(sign: str, kind: Kind) -> str:
+    """The line of the legend that says so."""
+    value = f"cost {kind.cost!r}" if kind.cost >= 0.0 else f"reward {-kind.cost!r}"
+    return f"{sign} = {value.removesuffix('.0')}{', end' if kind.ends and sign not in ENDS else ''}"
 
 
 @lru_cache(maxsize=64)

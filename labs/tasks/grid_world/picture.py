@@ -8,15 +8,22 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from labs.colors import NO_VALUE, sequential
 from labs.scene import Color, Scene, cell_at, cell_centers
+from labs.tasks.grid_world.cells import CellWorld
 from labs.tasks.grid_world.map import GridWorld
 from labs.tasks.grid_world.walk import GridWalk
 
 BOARD = "board"
 """The handle that a click on the board holds."""
 WALL, CLIFF, GOAL = (0.36, 0.38, 0.42), (0.55, 0.12, 0.12), (0.20, 0.66, 0.33)
+HOLE = (0.78, 0.36, 0.30)
+MANY = 200
+"""States from which on walls no longer stand out of the relief."""
+LABELLED = 80
+"""States at most of which all that are not free have their letters on them."""
 WALKERS: tuple[Color, ...] = ("actual", "reference")
 """Of the first and the second of those side by side."""
 HEIGHT = 0.55
@@ -33,11 +40,13 @@ class Board:
 
     rows: int
     columns: int
+    largest_cell: float = CellWorld.largest_cell
+    """[m]"""
 
     @property
     def size(self) -> float:
         """[m] Side of a cell."""
-        return min(0.24, 2.1 / self.columns, 1.1 / self.rows)
+        return min(self.largest_cell, 2.1 / self.columns, 1.1 / self.rows)
 
     @property
     def origin(self) -> tuple[float, float, float]:
@@ -67,9 +76,16 @@ class Board:
 
 
 @lru_cache(maxsize=16)
-def board(world: GridWorld) -> Board:
+def board(world: CellWorld) -> Board:
     """Of a world's map."""
-    return Board(*world.shape)
+    return Board(*world.shape, world.largest_cell)
+
+
+def value_span(V: np.ndarray) -> tuple[float, float]:
+    """From where to where values (X,) are coloured: what is finite of them, and 0."""
+    there = V[np.isfinite(V)]
+    low, high = float(there.min(initial=0.0)), float(there.max(initial=0.0))
+    return low, high if high > low else low + 1.0
 
 
 def draw_board(
@@ -79,19 +95,21 @@ def draw_board(
     high: float,
     policy: np.ndarray | None,
     *,
+    low: float = 0.0,
     known: np.ndarray | None = None,
     relief: bool = False,
 ) -> None:
-    """Values V (X,), which may be NaN, coloured from 0 to `high` > 0, and a policy, (X,) controls
+    """Values V (X,), which may be NaN, coloured from `low` to `high` > low; a policy, (X,) controls
     or (X, U) probabilities, if any; of the states in `known` (X,) bool only, if given. With
     `relief` the values stand beside the board as a surface, too, `high` HEIGHT tall."""
     place = board(world)
-    heights = _heights(world, V, high)
+    heights = _heights(world, V, low, high)
     relief = relief and min(world.shape) >= 2
     scene.camera(*CAMERA, core=place.around)
     scene.cells(BOARD, place.origin, place.size, _colors(world, V, heights, goals=True))
+    named = "SG+-" if len(world.cells) > LABELLED else set("".join(world.rows)) - {"."}
     for x in range(len(world.cells)):
-        if world.kind(x) in "SG":
+        if world.kind(x) in named:
             corner = place.centers[tuple(world.cells[x])] + place.size * np.array([-0.3, 0.3, 0.1])
             scene.label(f"cell {x}", world.kind(x), corner)
     for column, wind in enumerate(world.wind):
@@ -108,7 +126,7 @@ def draw_board(
 
 
 def draw_way(
-    scene: Scene, world: GridWorld, cells: np.ndarray, which: int, name: str = "way"
+    scene: Scene, world: CellWorld, cells: np.ndarray, which: int, name: str = "way"
 ) -> None:
     """The way through cells (k, 2), in the colour of the walker number `which`, a little beside
     those of the others."""
@@ -119,7 +137,7 @@ def draw_way(
         scene.trail(f"{name} {which + 1}", points, WALKERS[which])
 
 
-def draw_walkers(scene: Scene, world: GridWorld, walk: GridWalk) -> None:
+def draw_walkers(scene: Scene, world: CellWorld, walk: GridWalk) -> None:
     """Everybody on the way from one cell to the next; a cell that is no longer on the map is drawn
     at its edge."""
     place, part = board(world), walk.clock / walk.move
@@ -127,23 +145,32 @@ def draw_walkers(scene: Scene, world: GridWorld, walk: GridWalk) -> None:
     begin, end = (place.centers[tuple(np.minimum(at, last).T)] for at in (walk.at, walk.to))
     for m, center in enumerate((1.0 - part) * begin + part * end):
         beside = place.size * np.array([0.15 * m, 0.15 * m, 0.3])
-        scene.sphere(f"walker {m + 1}", center + beside, 0.24 * place.size, WALKERS[m])
+        scene.sphere(f"walker {m + 1}", center + beside, min(0.24 * place.size, 0.06), WALKERS[m])
 
 
-def _heights(world: GridWorld, V: np.ndarray, high: float) -> np.ndarray:
+def _heights(world: GridWorld, V: np.ndarray, low: float, high: float) -> np.ndarray:
     """(rows, columns) [m] in proportion to the values; flat where there are none. Walls stand out,
-    and a cliff is a hole."""
-    there = np.where(np.isfinite(V), V, 0.0)
-    heights = world.on_map(np.clip(there / high, -0.2, 1.3) * HEIGHT)
-    return np.where(_is(world, "#"), HEIGHT, heights)
+    but on a map of many cells, where they would hide all else: there they are as high as what is
+    around them. A cliff is a hole."""
+    part = np.where(np.isfinite(V), V - low, 0.0) / (high - low)
+    heights = world.on_map(np.clip(part, -0.2, 1.3) * HEIGHT)
+    walls = _is(world, "#")
+    if len(world.cells) <= MANY:
+        return np.where(walls, HEIGHT, heights)
+    around = sliding_window_view(np.pad(np.where(walls, np.nan, heights), 1, mode="edge"), (3, 3))
+    counted = np.maximum(np.isfinite(around).sum(axis=(2, 3)), 1)
+    return np.where(walls, np.nansum(around, axis=(2, 3)) / counted, heights)
 
 
 def _colors(world: GridWorld, V: np.ndarray, heights: np.ndarray, *, goals: bool) -> np.ndarray:
     """(rows, columns, 3): by value; walls, the cliff and, if `goals`, those have their own."""
     colors = sequential(heights, 0.0, HEIGHT)
     colors[tuple(world.cells[~np.isfinite(V)].T)] = NO_VALUE
-    for sign, color in {"#": WALL, "C": CLIFF, **({"G": GOAL} if goals else {})}.items():
+    for sign, color in {"#": WALL, "C": CLIFF}.items():
         colors[_is(world, sign)] = color
+    if goals:
+        colors[tuple(world.cells[world.terminal].T)] = HOLE
+        colors[tuple(world.cells[world.goals].T)] = GOAL
     return colors
 
 

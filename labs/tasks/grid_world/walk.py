@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labs.problems.finite_mdp import FiniteMDP
-from labs.tasks.grid_world.map import GridWorld
+from labs.tasks.grid_world.cells import CellWorld
 
 PATH = 300
 """Cells kept of a walk."""
@@ -39,19 +39,19 @@ class GridWalk:
     """Periods since the last decision; 0: the next one is due."""
 
 
-def start_walk(world: GridWorld, move: int, walkers: int = 1, start: int | None = None) -> GridWalk:
+def start_walk(world: CellWorld, move: int, walkers: int = 1, start: int | None = None) -> GridWalk:
     """At the start of the map, or in the state `start`, before the first decision."""
     at = np.tile(world.cells[world.start if start is None else start], (walkers, 1))
     return GridWalk(at, at, np.zeros(walkers), at[None], move)
 
 
-def is_on(world: GridWorld, walk: GridWalk) -> bool:
+def is_on(world: CellWorld, walk: GridWalk) -> bool:
     """Whether the cells of a walk are states of this world: its map may have changed."""
     return all(world.state(cell) >= 0 for cell in (*walk.at, *walk.to))
 
 
 def choose_steps(
-    world: GridWorld,
+    world: CellWorld,
     mdp: FiniteMDP,
     policies: np.ndarray,
     walk: GridWalk,
@@ -63,7 +63,7 @@ def choose_steps(
     found = [world.state(cell) for cell in walk.at]
     states = [world.start if x < 0 else x for x in found]
     controls = [int(policy[x]) for policy, x in zip(policies, states, strict=True)]
-    ahead = [_next_state(mdp, x, u, random) for x, u in zip(states, controls, strict=True)]
+    ahead = [mdp.sample(x, u, random) for x, u in zip(states, controls, strict=True)]
     return replace(
         walk,
         at=world.cells[states],
@@ -83,17 +83,11 @@ def advance_walk(walk: GridWalk) -> GridWalk:
     return replace(walk, at=walk.to, path=path, clock=0)
 
 
-def _next_state(mdp: FiniteMDP, x: int, u: int, random: Callable[[], float]) -> int:
-    if mdp.successor is not None:
-        return int(mdp.successor[x, u])
-    return int(np.searchsorted(mdp.cumulative[u, x], random(), side="right"))
-
-
-def nominal_path(world: GridWorld, policies: np.ndarray | Sequence[np.ndarray]) -> np.ndarray:
+def nominal_path(world: CellWorld, policies: np.ndarray | Sequence[np.ndarray]) -> np.ndarray:
     """(k, 2) cells from the start on, were nothing left to chance: under one policy (X,) to a goal
     or to where the way comes again; or, from N steps to go down to 1, under policies (N, X) by
     the steps to go less one."""
-    successor, _ = world.table
+    successor = world.nominal
     policies = np.asarray(policies)
     stationary = policies.ndim == 1
     x, path = world.start, [world.start]

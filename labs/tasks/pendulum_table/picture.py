@@ -61,6 +61,13 @@ def draw_table(
         scene.label(f"name {m + 1}", name, (0.0, PIVOT - ASIDE * m, 1.4))
 
 
+def draw_wires(scene: Scene, grid: PendulumGrid, V: np.ndarray, high: float) -> None:
+    """Other values V (X,), finite, as lines over the same floor, to compare with a relief."""
+    points = _place(grid, grid.nodes.reshape(*grid.shape, 2))
+    points[..., 2] += np.clip(V.reshape(grid.shape) / high, -0.2, 1.3) * HEIGHT
+    scene.trail("wires", points.transpose(1, 0, 2)[::3] + ABOVE, "reference", 0.7)
+
+
 def _draw_relief(scene: Scene, grid: PendulumGrid, heights: np.ndarray, known: np.ndarray) -> None:
     stride = max(1, -(-grid.q_nodes // MESH))
     some = (slice(None, None, stride), slice(None, None, stride))

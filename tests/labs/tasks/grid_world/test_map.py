@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
+from labs.algorithms.policy_evaluation import exact
+from labs.algorithms.policy_iteration import optimum
 from labs.errors import LabError
+from labs.problems.finite_mdp import FiniteMDP, random_policy
 from labs.tasks.grid_world.map import FALL, MAPS, GridWorld
 
 UP, RIGHT, DOWN, LEFT = range(4)
@@ -20,7 +23,7 @@ def step(world: GridWorld, row: int, column: int, u: int) -> tuple[int, int]:
 @pytest.mark.parametrize("kings", [False, True])
 def test_the_named_maps_are_worlds(name: str, kings: bool) -> None:
     world = GridWorld.parse(MAPS[name], kings)
-    assert world.text == MAPS[name]
+    assert world.text == MAPS[name].replace("F", ".")
     assert GridWorld.parse(world.text, kings) == world
     for slip in (0.0, 0.3):
         mdp = world.mdp(1.0, slip)
@@ -98,17 +101,81 @@ def test_cells_are_edited() -> None:
 
 
 @pytest.mark.parametrize(
+    ("text", "wanted", "note"),
+    [
+        ("SFFF\nFHFG\nH=0", "S...\n.H.G\nH = cost 0", "Read F as . (free)."),
+        ("S X\n  G", "S.#\n..G", "Read a space as . (free), X as # (wall)."),
+        ("\ufeffs.g\r\n...\r\n", "S.G\n...", "Read s as S, g as G."),
+        ("S . #\n. . G", "S.#\n..G", ""),
+        ("S,.,#\n.,.,G", "S.#\n..G", ""),
+        ('["SFF", "FFG"]', "S..\n..G", "Read F as . (free)."),
+        ("S  \n # \n  G", "S..\n.#.\n..G", "Read a space as . (free)."),
+    ],
+    ids=["lake", "spaces", "small letters", "blanks between", "commas", "list", "ends of rows"],
+)
+def test_maps_of_others_are_read(text: str, wanted: str, note: str) -> None:
+    world = GridWorld.parse(text)
+    assert world.text == wanted
+    assert world.notes == ((note,) if note else ())
+
+
+def test_holes_and_other_ends_end() -> None:
+    world = GridWorld.parse("SHT\nm+G\nT = reward 5, end\nm = cost 3/2\nG: reward 1")
+    np.testing.assert_array_equal(world.terminal, [False, True, True, False, True, True])
+    np.testing.assert_array_equal(world.goals, [False, False, True, False, False, False])
+    _, cost = world.table
+    assert (cost[0, DOWN], cost[0, RIGHT], cost[0, UP]) == (2.5, 101.0, 1.0)
+    assert (cost[3, UP], cost[3, DOWN]) == (1.0, 2.5), "staying there costs again"
+    assert cost[3, RIGHT] == 0.0
+    assert not cost[world.terminal].any()
+    np.testing.assert_array_equal(world.mdp(1.0, living=0.1).C[0, [UP, DOWN]], [0.1, 1.6])
+    assert GridWorld.parse(world.text) == world
+    assert "T = reward 5, end\nm = cost 1.5\nG = reward 1" in world.text
+    assert world.with_cell(0, 1, ".").text.startswith("S.T")
+    assert world.notes == ("A hole H ends an episode and costs 100; H = cost 0 below the map: 0.",)
+
+
+def test_slip_sideways_goes_to_the_two_sides() -> None:
+    world = GridWorld.parse("...\nS..\n..G", kings=True)
+    mdp = world.mdp(0.9, 0.2, sideways=True)
+    middle = world.index[1, 1]
+    for u, ways in ((RIGHT, ((1, 2), (0, 1), (2, 1))), (4, ((0, 2), (0, 0), (2, 2)))):
+        row = mdp.probabilities[u, middle]
+        for cell, wanted in zip(ways, (0.8, 0.1, 0.1), strict=True):
+            assert row[world.index[cell]] == pytest.approx(wanted)
+
+
+def test_a_large_map_is_solved_at_once() -> None:
+    """32 x 32, slippery: few outcomes are kept, not all pairs of states."""
+    rng = np.random.default_rng(3)
+    cells = np.where(rng.random((32, 32)) < 0.2, "#", ".")
+    cells[0, 0], cells[-1, -1] = "S", "G"
+    world = GridWorld.parse("\n".join("".join(row) for row in cells))
+    mdp = world.mdp(0.99, 0.2, sideways=True)
+    assert mdp.P is not None
+    assert mdp.P.shape == (4, len(world.cells), 3)
+    V, policy, _ = optimum(mdp, random_policy(mdp))
+    ahead = np.einsum("uxk,uxk->xu", mdp.P, V[mdp.outcomes])
+    np.testing.assert_allclose((mdp.C + 0.99 * ahead).min(axis=1), V, atol=1e-9)
+    dense = FiniteMDP(mdp.C, 0.99, mdp.terminal, P=mdp.probabilities)
+    np.testing.assert_allclose(exact(dense, policy), V, atol=1e-9)
+
+
+@pytest.mark.parametrize(
     ("text", "sentence"),
     [
         ("", "at least one row"),
         ("012", "at least one row"),
         ("S.\n.G.", "row 2 of the map, '.G.', has 3 cells and the first 2"),
-        ("S.\n.x\n.G", "row 2 of the map has 'x'"),
+        ("S.\n.?\n.G", "row 2 of the map has '?'"),
         ("SG\n012", "the wind has 3 digits: one for each of 2"),
         ("SS\n.G", "2 starts"),
         ("S.", "no goal"),
         (".C\n.G", "no start"),
-        ("G" * 17, "too large"),
+        ("G" * 33, "too large"),
+        ("SQ\n.G", "or say below the map what it costs: Q = cost 3"),
+        ("Sm\n.G\nm = dear", "'m = dear': a letter has a cost or a reward"),
+        ("S#\n.G\n# = cost 1", "nobody gets into a wall"),
     ],
 )
 def test_what_is_no_map_is_refused(text: str, sentence: str) -> None:

@@ -28,7 +28,7 @@ def test_a_map_that_is_none_is_refused_in_a_sentence() -> None:
     with pytest.raises(ParameterError, match="the map has no goal G"):
         Mapped().change({"map": "S.."})
     with pytest.raises(ParameterError, match="row 2 of the map"):
-        Mapped().change({"map": "S..\n.x.\n..G"})
+        Mapped().change({"map": "S..\n.?.\n..G"})
     assert Mapped().change({"map": "..G"}).map == "..G"
 
 

@@ -99,6 +99,14 @@ def test_the_relief_is_as_tall_as_the_values() -> None:
     np.testing.assert_allclose(heights, [[HEIGHT, HEIGHT / 2, HEIGHT], [0.0, 0.0, 0.0]])
 
 
+def test_walls_of_a_large_map_are_as_high_as_what_is_around_them() -> None:
+    rows = ["." * 20] * 14 + ["." * 10 + "#" * 3 + "." * 7, "S" + "." * 18 + "G"]
+    world, scene = GridWorld.parse("\n".join(rows)), Drawn()
+    draw_board(scene, world, np.full(len(world.cells), 1.0), 2.0, None, relief=True)
+    heights = scene.points["relief"][..., 2] - board(world).relief[..., 2]
+    np.testing.assert_allclose(heights, HEIGHT / 2)
+
+
 def test_arrows_point_where_the_policy_leads_in_the_states_that_are_known() -> None:
     scene, known = Drawn(), np.array([True, False, True, True])
     draw_board(scene, WORLD, np.zeros(4), 1.0, np.array([1, 1, 0, 0]), known=known)

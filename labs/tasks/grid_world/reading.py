@@ -1,0 +1,129 @@
+"""Reading maps as people write them (the letters are in map.py): as plain rows, as a list in
+quotes, with blanks or commas between the cells, in letters of other books.
+"""
+
+import re
+from collections.abc import Container, Iterator, Mapping
+from dataclasses import dataclass
+
+from labs.errors import LabError
+
+TRANSLATIONS = {"F": ".", "X": "#", " ": ".", "_": "."}
+"""Letters of other maps: FrozenLake's frozen cells, mazes' walls and ways."""
+WORDS = {".": "free", "#": "wall"}
+MAX_COST = 1e4
+"""Of a cell, either sign."""
+_LEGEND = re.compile(r"\s*(\S)\s*[=:]\s*(\S.*)")
+_VALUE = re.compile(r"(?:(cost|reward)\s+)?([-+−]?[\d./]{1,20})", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What the map says of a letter of its own."""
+
+    cost: float
+    """Of a step that leads there."""
+    ends: bool
+    """Whether the episode ends there."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A map, its rows still in all lengths."""
+
+    rows: list[str]
+    wind: tuple[int, ...]
+    """A last row of digits; empty where there is none."""
+    legend: dict[str, Kind]
+    notes: tuple[str, ...]
+    """What was understood otherwise than written, in sentences."""
+
+
+def read_map(text: str, known: Mapping[str, str], ending: Container[str]) -> Reading:
+    """The rows of a map, in letters that are `known` or explained in lines below it, such as
+
+        m = cost 3            a step there costs 3 more
+        T = reward 5, end     and one there gains 5, and is the last
+
+    where a letter in `ending` ends without saying so. Raises LabError, naming the line."""
+    lines = text.replace("\ufeff", "").strip("\r\n").splitlines()
+    said = [found for found in map(_LEGEND.fullmatch, lines) if found]
+    legend = {found[1]: _kind(found[0].strip(), found[2], found[1] in ending) for found in said}
+    rows = _rows([line for line in lines if not _LEGEND.fullmatch(line)])
+    if legend.get("C", Kind(0.0, False)).ends or "#" in legend:
+        raise LabError("nobody gets into a wall #, and no fall off the cliff C is an end")
+    wind = tuple(map(int, rows.pop())) if rows and rows[-1].isdecimal() else ()
+    notes: dict[str, str] = {}
+    understood = []
+    for number, row in enumerate(rows, 1):
+        cells = []
+        for cell in row:
+            meant = _meaning(cell, known, legend)
+            if not meant:
+                raise LabError(
+                    f"row {number} of the map has {cell!r}: there are "
+                    f"{', '.join(f'{sign} {word}' for sign, word in known.items())}; or say below "
+                    f"the map what it costs: {cell} = cost 3, or {cell} = reward 1, end"
+                )
+            if meant != cell:
+                name = "a space" if cell == " " else cell
+                word = f" ({WORDS[meant]})" if meant in WORDS else ""
+                notes[cell] = f"{name} as {meant}{word}"
+            cells.append(meant)
+        understood.append("".join(cells))
+    sentences = (f"Read {', '.join(notes.values())}.",) if notes else ()
+    return Reading(understood, wind, legend, sentences)
+
+
+def _meaning(cell: str, known: Container[str], legend: Container[str]) -> str:
+    for meant in (cell, cell.upper(), TRANSLATIONS.get(cell.upper(), "")):
+        if meant and (meant in known or meant in legend):
+            return meant
+    return ""
+
+
+def _rows(lines: list[str]) -> list[str]:
+    quoted = re.findall(r"""["']([^"']*)["']""", "\n".join(lines))
+    if quoted:  # a list of strings, as Gymnasium's maps are
+        return quoted
+    rows = [line.strip() for line in lines if line.strip()]
+    for separated in (re.compile(r"\S(?:,\s*\S)+,?"), re.compile(r"\S(?:\s+\S)+")):
+        if rows and all(map(separated.fullmatch, rows)):
+            return [re.sub(r"[,\s]", "", row) for row in rows]
+    uneven = set(map(len, rows)) != {max(map(len, rows), default=0)} - {1}
+    if uneven and any(" " in line.rstrip() for line in lines):
+        # Spaces are cells, and those at the end of a row were left out.
+        lines = [line for line in lines if line.strip()]
+        return [line.rstrip().ljust(max(len(one.rstrip()) for one in lines)) for line in lines]
+    return rows
+
+
+def _kind(line: str, said: str, ends: bool) -> Kind:
+    cost = 0.0
+    for word in _words(said):
+        if word in ("end", "goal", "terminal"):
+            ends = True
+            continue
+        found = _VALUE.fullmatch(word)
+        value = _number(found[2]) if found else None
+        if not found or value is None or abs(value) > MAX_COST:
+            raise LabError(
+                f"{line!r}: a letter has a cost or a reward of at most {MAX_COST:g}, and may be "
+                "an end: m = cost 3, or T = reward 5, end"
+            )
+        cost = -value if (found[1] or "").lower() == "reward" else value
+    return Kind(cost + 0.0, ends)
+
+
+def _words(said: str) -> Iterator[str]:
+    for word in said.split(","):
+        if word.strip():
+            yield " ".join(word.lower().split())
+
+
+def _number(text: str) -> float | None:
+    top, _, bottom = text.replace("−", "-").partition("/")
+    try:
+        return float(top) / float(bottom or "1")
+    except (ValueError, ZeroDivisionError):
+        return None

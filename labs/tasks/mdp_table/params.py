@@ -1,0 +1,49 @@
+"""Tunables that the labs which take a table have in common: its text, and published ones."""
+
+from collections.abc import Mapping
+from typing import Annotated
+
+from pydantic import AfterValidator
+
+from labs.errors import LabError
+from labs.tasks.mdp_table.table import parse_table
+
+TAXICAB = """from, action, to, probability, reward
+A, cruise, A, 1/2, 10
+A, cruise, B, 1/4, 4
+A, cruise, C, 1/4, 8
+A, stand, A, 1/16, 8
+A, stand, B, 3/4, 2
+A, stand, C, 3/16, 4
+A, radio, A, 1/4, 4
+A, radio, B, 1/8, 6
+A, radio, C, 5/8, 4
+B, cruise, A, 1/2, 14
+B, cruise, C, 1/2, 18
+B, stand, A, 1/16, 8
+B, stand, B, 7/8, 16
+B, stand, C, 1/16, 8
+C, cruise, A, 1/4, 10
+C, cruise, B, 1/4, 2
+C, cruise, C, 1/2, 8
+C, stand, A, 1/8, 6
+C, stand, B, 3/4, 4
+C, stand, C, 1/8, 2
+C, radio, A, 3/4, 4
+C, radio, B, 1/16, 0
+C, radio, C, 3/16, 8"""
+"""R. A. Howard's taxicab (Dynamic Programming and Markov Processes, 1960): three towns, and in B
+no radio."""
+TABLES: Mapping[str, str] = {"Taxicab": TAXICAB}
+
+
+def _is_a_table(text: str) -> str:
+    try:
+        parse_table(text)
+    except LabError as error:
+        raise ValueError(str(error)) from None
+    return text
+
+
+TableText = Annotated[str, AfterValidator(_is_a_table)]
+"""The type of a field of Params that holds a table; what is none is refused in a sentence."""

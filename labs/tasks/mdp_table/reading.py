@@ -1,0 +1,235 @@
+"""Reading tables of Markov decision processes as people write them: CSV (commas, semicolons or
+tabs) or JSON, wide or long.
+
+Wide, a row for each state, or for each state and control, and a column for each next state:
+
+    state, cost, A,   B              state, control, cost, A,   B
+    A,     1,    1/2, 1/2            A,     stay,    1,    1,   0
+    B,     0,    0,   1              A,     go,      3,    0.2, 0.8
+                                     B,     ,        0,    0,   1
+
+Long, a row for each transition:
+
+    from, action, to, probability, reward
+    A,    stay,   A,  1,           -1
+    A,    go,     A,  20 %,        -3
+    A,    go,     B,  80 %,        -3
+
+In JSON a list of such rows, {"state": "A", "control": "go", "cost": 3, "to": {"A": 0.2, "B": 0.8}}
+or {"from": "A", "action": "go", "to": "B", "probability": 0.8, "reward": -3}, or the dictionary P
+of Gymnasium's environments, {"0": {"1": [[probability, next state, reward, terminated], ...]}}.
+
+The order of the rows is the order of the states; an episode starts in the first. Costs may be left
+out (0), and so may probabilities that are 0, or in a long row 1. A reward is a negative cost. A
+state that long rows lead to, and that has none, is terminal, and so is one whose wide row is empty.
+A row without a control, among others that have one, is of all controls; a state need not have all.
+Rows are counted from 1 below the heading; errors name them.
+"""
+
+import csv
+import io
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from labs.errors import LabError
+from labs.number_texts import parse_number, shorten
+
+MAX_COST = 1e6
+"""Of a cost, either sign."""
+NEGLIGIBLE = 1e-9
+"""So far a probability may be from 0 and 1 and still be one of them: rounding."""
+HEADINGS = {
+    "state": ("state", "from", "s", "source", "current state"),
+    "control": ("control", "action", "a", "u"),
+    "to": ("to", "next", "next state", "next_state", "s'", "s_next", "successor", "target"),
+    "p": ("probability", "prob", "p", "chance", "pr"),
+    "cost": ("cost", "c", "l"),
+    "reward": ("reward", "r"),
+    "end": ("terminal", "terminated", "done", "end"),
+}
+"""What the columns of a long table may be called, ..."""
+HEADINGS_OF_WIDE = {"state": "state", "from": "state", "control": "control", "action": "control"}
+HEADINGS_OF_WIDE |= {"cost": "cost", "reward": "reward"}
+"""... and of a wide one, whose other columns are states."""
+TRUE, FALSE = ("1", "1.0", "true", "yes", "x"), ("", "0", "0.0", "false", "no")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A row."""
+
+    number: int
+    state: str
+    control: str
+    cost: float
+    to: Mapping[str, float]
+    """The probabilities of the next states."""
+    long: bool
+    """Whether it is one of several for the same state and control."""
+    ends: tuple[str, ...] = ()
+    """States it says are terminal."""
+
+    @property
+    def name(self) -> str:
+        return _name(self.number, self.state, self.control)
+
+
+def read_entries(text: str) -> tuple[list[Entry], tuple[str, ...]]:
+    """The rows, and what was understood otherwise than written. Raises LabError."""
+    text = text.replace("\ufeff", "")
+    reader = _read_json if text.lstrip()[:1] in ("[", "{") else _read_csv
+    rewarded: list[str] = []
+    entries = list(reader(text, rewarded))
+    notes = ("Rewards are read as costs of the other sign.",) if rewarded else ()
+    return entries, notes
+
+
+def _read_csv(text: str, rewarded: list[str]) -> Iterator[Entry]:
+    lines = [line for line in text.splitlines() if line.strip()]
+    mark = ""
+    if lines and lines[0].strip().strip('"').lower().startswith("sep="):
+        mark = lines.pop(0).strip().strip('"')[4:5]
+    heading = lines[0] if lines else ""
+    mark = mark or next((mark for mark in "\t;" if mark in heading), ",")
+    try:
+        table = csv.reader(io.StringIO("\n".join(lines)), delimiter=mark, skipinitialspace=True)
+        cells = [[cell.strip() for cell in line] for line in table]
+    except (csv.Error, TypeError) as error:
+        raise LabError(f"the table cannot be read: {error}") from None
+    cells = [line for line in cells if any(line)]
+    columns = _without_trailing(cells[0]) if cells else []
+    columns, long = _columns(columns)
+    for number, line in enumerate(cells[1:], 1):
+        if len(line) > len(columns):
+            line = line[: len(columns)] + _without_trailing(line[len(columns) :])
+        name = _name(number, line[0])
+        if len(line) != len(columns):
+            raise LabError(f"{name}: {len(line)} entries for {len(columns)} columns")
+        row: dict[str, Any] = dict(zip(columns, line, strict=True))
+        if mark != ",":  # numbers may then have a decimal comma
+            words = ("state", "control", "to") if long else ("state", "control")
+            row = {k: v if k in words else v.replace(",", ".") for k, v in row.items()}
+        if not long:
+            first = {k: row.pop(k) for k in ("state", "control", "cost", "reward") if k in row}
+            row = first | {"to": row if any(row.values()) else {first["state"]: 1}}
+        yield _entry(number, row, rewarded, "to" if long else "")
+
+
+def _columns(columns: Sequence[str]) -> tuple[list[str], bool]:
+    """The columns by the names used here, and whether the table is long."""
+    meant = {word: name for name, words in HEADINGS.items() for word in words}
+    lower = [column.lower() for column in columns]
+    named = [meant.get(column, "") for column in lower]
+    long = "to" in named and all(named)
+    if not long:
+        named = [HEADINGS_OF_WIDE.get(low, own) for low, own in zip(lower, columns, strict=True)]
+    if not columns or named[0] != "state":
+        raise LabError(
+            "the heading of a table begins with state, then control and cost where there are any, "
+            "then the name of each state: state, cost, A, B; or it is from, action, to, "
+            "probability, reward"
+        )
+    if len(set(named)) < len(named) or "" in named:
+        raise LabError(f"each column has a name of its own; the heading is {', '.join(columns)}")
+    return named, long
+
+
+def _without_trailing(cells: Sequence[str]) -> list[str]:
+    """Cells without the empty ones that delimiters at the end of a line make."""
+    kept = list(cells)
+    while kept and not kept[-1]:
+        kept.pop()
+    return kept
+
+
+def _read_json(text: str, rewarded: list[str]) -> Iterator[Entry]:
+    try:
+        rows = json.loads(text, parse_int=float)
+    except (ValueError, RecursionError) as error:
+        raise LabError(f"the table is not sound JSON: {error}") from None
+    if isinstance(rows, dict):
+        rows = list(_gymnasium_rows(rows))
+    for number, row in enumerate(rows, 1):
+        if not isinstance(row, dict) or not isinstance(row.get("to"), dict | str | float):
+            raise LabError(
+                f'row {number}: a row is {{"state": "A", "cost": 1, "to": {{"A": 1}}}}, '
+                'with a "control" where there are any; or {"from": "A", "to": "A", '
+                '"probability": 1}'
+            )
+        meant = {word: name for name, words in HEADINGS.items() for word in words}
+        strange = [key for key in row if key.lower() not in meant]
+        if strange:
+            raise LabError(
+                f"row {number}: {', '.join(sorted(strange))}? A row has state, control, cost, to"
+            )
+        named = {meant[key.lower()]: value for key, value in row.items()}
+        yield _entry(number, named, rewarded, "" if isinstance(named["to"], dict) else "to")
+
+
+def _gymnasium_rows(P: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
+    """The transitions of the dictionary P."""
+    try:
+        for state, controls in P.items():
+            for control, outcomes in controls.items():
+                for p, ahead, reward, terminated in outcomes:
+                    yield {
+                        "state": state, "control": control, "to": ahead, "p": p,
+                        "reward": reward, "end": terminated,
+                    }  # fmt: skip
+    except (TypeError, ValueError, AttributeError):
+        raise LabError(
+            'a table in JSON is a list of rows, [{"state": "A", "to": {"A": 1}}], or has for each '
+            'state and control its outcomes, {"0": {"1": [[probability, next state, reward, '
+            "terminated]]}}"
+        ) from None
+
+
+def _entry(number: int, row: Mapping[str, Any], rewarded: list[str], long: str) -> Entry:
+    state, control = (_word(row.get(key, "")) for key in ("state", "control"))
+    name = _name(number, state, control)
+    if not state:
+        raise LabError(f"row {number}: it does not name its state")
+    cost = _number(row.get("cost", 0), name, "cost") - _number(row.get("reward", 0), name, "reward")
+    if "reward" in row:
+        rewarded.append(name)
+    if abs(cost) > MAX_COST:
+        raise LabError(f"{name}: the cost {cost:g} is beyond {MAX_COST:g}")
+    if not long:
+        to = {str(y).strip(): _probability(p, name, str(y)) for y, p in row["to"].items()}
+        return Entry(number, state, control, cost + 0.0, to, False)
+    ahead = _word(row["to"])
+    if not ahead:
+        raise LabError(f"{name}: it does not say where it leads to")
+    given = row.get("p", 1)
+    p = _probability(1 if given == "" else given, name, ahead)
+    end = str(row.get("end", "")).strip().lower()
+    if end not in TRUE + FALSE:
+        raise LabError(f"{name}: {shorten(end)!r} for terminal is neither true nor false")
+    return Entry(number, state, control, cost + 0.0, {ahead: p}, True, (ahead,) * (end in TRUE))
+
+
+def _word(value: object) -> str:
+    """The name of a state or a control; that of a number is the number."""
+    return f"{value:g}" if isinstance(value, float) else str(value).strip()
+
+
+def _probability(entry: object, name: str, column: str) -> float:
+    value = _number(entry, name, column)
+    if not -NEGLIGIBLE <= value <= 1.0 + NEGLIGIBLE:
+        raise LabError(f"{name}: {value:.12g} for {column}: a probability is from 0 to 1")
+    return min(max(value, 0.0), 1.0)
+
+
+def _number(entry: object, name: str, column: str) -> float:
+    """A number, or a fraction; an empty entry is 0."""
+    try:
+        return parse_number(str(entry).strip() or "0")
+    except ValueError:
+        raise LabError(f"{name}: {shorten(str(entry))!r} for {column} is not a number") from None
+
+
+def _name(number: int, state: str, control: str = "") -> str:
+    """Of a row, in errors."""
+    return f"row {number} ({', '.join(filter(None, (state, control)))})"

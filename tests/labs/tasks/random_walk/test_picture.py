@@ -1,0 +1,123 @@
+"""Random walks as they are drawn: bars as tall as values, a walker where it is."""
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike
+
+from labs.scene import Color, NullScene
+from labs.shapes import Vector3
+from labs.tasks.random_walk.picture import (
+    BEYOND,
+    FLOOR,
+    FREE,
+    GAIN,
+    HEIGHT,
+    LOSS,
+    cell_places,
+    cell_size,
+    draw_values,
+    draw_walk,
+    state_at,
+    state_names,
+    value_heights,
+)
+from labs.tasks.random_walk.walks import FIVE, NINETEEN, THOUSAND, walk_task
+
+
+class Drawn(NullScene):
+    """Keeps what is drawn."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.points: dict[str, np.ndarray] = {}
+        self.labels: dict[str, str] = {}
+        self.colors = np.zeros((0, 0, 3))
+
+    def cells(
+        self,
+        name: str,
+        origin: ArrayLike,
+        size: float,
+        colors: np.ndarray,
+        *,
+        clickable: bool = True,
+    ) -> None:
+        super().cells(name, origin, size, colors, clickable=clickable)
+        self.colors = colors
+
+    def sphere(self, name: str, center: ArrayLike, radius: float, color: Color = "actual") -> None:
+        super().sphere(name, center, radius, color)
+        self.points[name] = np.asarray(center)
+
+    def trail(
+        self, name: str, points: np.ndarray, color: Color = "actual", strength: float = 1.0
+    ) -> None:
+        super().trail(name, points, color, strength)
+        self.points[name] = points
+
+    def polygon(
+        self,
+        name: str,
+        corners: np.ndarray,
+        color: Color | Vector3 = "actual",
+        opacity: float = 1.0,
+    ) -> None:
+        super().polygon(name, corners, color, opacity)
+        self.points[name] = corners
+
+    def label(self, name: str, text: str, position: ArrayLike) -> None:
+        super().label(name, text, position)
+        self.labels[name] = text
+
+
+def test_states_have_letters_while_there_are_enough() -> None:
+    assert state_names(FIVE) == ("A", "B", "C", "D", "E")
+    assert state_names(THOUSAND)[:2] == ("1", "2")
+    assert len(state_names(THOUSAND)) == 1000
+
+
+def test_the_ends_wear_their_costs_and_the_walker_is_between_its_cells() -> None:
+    scene = Drawn()
+    draw_walk(scene, NINETEEN, 2.5, np.full((19, 3), 0.5))
+    assert scene.colors.shape == (1, 21, 3)
+    assert tuple(scene.colors[0, 0]) == LOSS
+    assert tuple(scene.colors[0, -1]) == GAIN
+    assert (scene.colors[0, 1:-1] == 0.5).all()
+    assert scene.labels["left end"] == "1"
+    assert "".join(scene.labels[f"state {name}"] for name in "ADGJMPS") == "ADGJMPS"
+    assert scene.labels["right end"] == "−1"
+    between = cell_places(NINETEEN)[2:4, 0].mean()
+    assert scene.points["walker"][0] == pytest.approx(between)
+    scene = Drawn()
+    draw_walk(scene, FIVE, None)
+    assert tuple(scene.colors[0, 0]) == FREE
+    assert "walker" not in scene.points
+
+
+def test_bars_reach_from_zero_to_their_values_over_their_cells() -> None:
+    scene, truth = Drawn(), walk_task(FIVE).truth
+    draw_values(scene, FIVE, [truth, np.zeros(7)], truth, [np.full(7, 0.1)])
+    zero = FLOOR + HEIGHT
+    places, half = cell_places(FIVE)[1:-1, 0], 0.5 * cell_size(FIVE)
+    for i, name in enumerate("ABCDE"):
+        for m, value in ((1, truth[i + 1]), (2, 0.0)):
+            corners = scene.points[f"value {m} of {name}"]
+            np.testing.assert_allclose(corners[:2, 2], zero)
+            np.testing.assert_allclose(corners[2:, 2], FLOOR + HEIGHT * (1.0 + value))
+            assert (np.abs(corners[:, 0] - places[i]) < half).all()
+    np.testing.assert_allclose(scene.points["truth"][:, 0, 2], value_heights(FIVE, truth[1:-1]))
+    whiskers = scene.points["spread 1"]
+    np.testing.assert_allclose(whiskers[:, 1, 2] - whiskers[:, 0, 2], 0.2 * HEIGHT)
+    assert "spread 2" not in scene.points
+
+
+def test_a_click_finds_its_state() -> None:
+    for x, (a, b, c) in enumerate(cell_places(FIVE)):
+        assert state_at(FIVE, (float(a), float(b), float(c))) == x
+    assert state_at(FIVE, (0.0, 5.0, 0.0)) is None
+
+
+def test_what_is_far_off_is_cut() -> None:
+    top, bottom = value_heights(NINETEEN, np.array([1e9, -1e9]))
+    assert top == pytest.approx(FLOOR + HEIGHT * (1.0 + BEYOND))
+    assert bottom == pytest.approx(FLOOR - HEIGHT * BEYOND)

@@ -1,5 +1,5 @@
 """Reaching, to be learned: a UR5 that moves its shoulder and elbow, the other joints locked, for
-deep Q-learning and, to come, Gymnasium.
+deep Q-learning and Gymnasium.
 
 Each of the two motors holds its arm against gravity and adds a torque to be chosen, held for a
 period. A step costs
@@ -17,7 +17,8 @@ from itertools import product
 import numpy as np
 import pinocchio as pin
 
-from labs.models.arms import load
+from labs.models.arms import Arm, load
+from labs.models.two_link import TwoLink, directions, sample_postures, simulate, two_link
 from labs.random_numbers import uniform
 from labs.tasks.environments.swing_up import PERIOD
 
@@ -36,11 +37,10 @@ WEIGHTS = (1.0, 0.01, 0.01)
 class Reach:
     """An `Environment`."""
 
-    model: pin.Model
-    """Of the two joints."""
-    data: pin.Data
-    tip: int
-    """A frame of the model."""
+    dynamics: TwoLink
+    """Of the two joints, held against gravity."""
+    tip: np.ndarray
+    """(5, 3) [m]: the tip, from its directions and 1."""
     torques: np.ndarray
     """(nu, 2) [N m] beyond gravity's."""
     largest: np.ndarray
@@ -57,11 +57,7 @@ class Reach:
 
     def tips(self, Q: np.ndarray) -> np.ndarray:
         """(k, 3) [m] at joint angles Q (k, 2)."""
-        model, data, found = self.model, self.data, np.empty((len(Q), 3))
-        for p, q in zip(found, Q, strict=True):
-            pin.framesForwardKinematics(model, data, q)
-            p[:] = data.oMf[self.tip].translation
-        return found
+        return np.asarray(directions(Q) @ self.tip[:4] + self.tip[4])
 
     def starts(self, random: np.ndarray, many: int) -> np.ndarray:
         drawn = np.array([[uniform(random) for _ in range(4)] for _ in range(many)])
@@ -83,23 +79,23 @@ class Reach:
         return np.concatenate(parts, axis=1, dtype=np.float32)
 
     def advance(self, X: np.ndarray, U: np.ndarray) -> np.ndarray:
-        model, data, limit, h = self.model, self.data, VELOCITY_LIMIT, PERIOD / self.substeps
-        after = X.copy()
-        for x, torque in zip(after, self.torques[U], strict=True):
-            held = pin.computeGeneralizedGravity(model, data, x[:2])
-            x[2:4] += h * pin.aba(model, data, x[:2], x[2:4], held + torque)
-        after[:, 2:4] = np.clip(after[:, 2:4], -limit, limit)
-        after[:, :2] += h * after[:, 2:4]
-        return after
+        return self.hold(X, self.torques[U], 1)
 
     def step(self, X: np.ndarray, U: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        torques = self.torques[U]
+        return self.hold(X, torques), self.cost(X, torques), np.zeros(len(X), bool)
+
+    def cost(self, X: np.ndarray, torques: np.ndarray) -> np.ndarray:
+        """l (k,) of a step from X (k, nx) under any torques (k, 2) [N m]."""
         w_p, w_v, w_u = WEIGHTS
         distance = np.linalg.norm(self.tips(X[:, 4:]) - self.tips(X[:, :2]), axis=1)
-        costs = w_p * distance + w_v * (X[:, 2:4] ** 2).sum(axis=1)
-        costs += w_u * ((self.torques[U] / self.largest) ** 2).sum(axis=1)
-        for _ in range(self.substeps):
-            X = self.advance(X, U)
-        return X, costs, np.zeros(len(X), bool)
+        effort = ((torques / self.largest) ** 2).sum(axis=1)
+        return np.asarray(w_p * distance + w_v * (X[:, 2:4] ** 2).sum(axis=1) + w_u * effort)
+
+    def hold(self, X: np.ndarray, torques: np.ndarray, parts: int = substeps) -> np.ndarray:
+        """X (k, nx) so many parts of a step later, under torques (k, 2) [N m]."""
+        body, h, limits = self.dynamics, PERIOD / self.substeps, np.full(2, VELOCITY_LIMIT)
+        return simulate(2, body.inertia, body.gravity, X, torques, limits, h, parts)
 
 
 @cache
@@ -111,5 +107,15 @@ def reach() -> Reach:
     model.armature = arm.model.armature[list(MOVING)]
     largest = np.array([30.0, 15.0])
     torques = largest * np.array(list(product((-1.0, 0.0, 1.0), repeat=2)))
-    tip = model.getFrameId(arm.model.frames[arm.tip].name)
-    return Reach(model, model.createData(), tip, torques, largest)
+    return Reach(two_link(model).without_gravity(), _tip(arm, model), torques, largest)
+
+
+def _tip(arm: Arm, model: pin.Model) -> np.ndarray:
+    """(5, 3) [m]: what `Reach.tips` takes of it."""
+    data, frame, Q = model.createData(), arm.model.frames[arm.tip].name, sample_postures()
+    places = np.empty((len(Q), 3))
+    for q, place in zip(Q, places, strict=True):
+        pin.framesForwardKinematics(model, data, q)
+        place[:] = data.oMf[model.getFrameId(frame)].translation
+    known = np.hstack([directions(Q), np.ones((len(Q), 1))])
+    return np.asarray(np.linalg.lstsq(known, places, rcond=None)[0])

@@ -1,5 +1,5 @@
 """Swinging up and balancing, to be learned: pendulums whose motors choose among a few torques, for
-deep Q-learning and, to come, function approximation and Gymnasium.
+deep Q-learning and Gymnasium.
 
 A step holds the torque for a period, in substeps of v += a h, q += v h, and costs
 
@@ -15,10 +15,10 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-import pinocchio as pin
 
 from labs.errors import LabError
 from labs.models.mechanisms import Mechanism, mechanism
+from labs.models.two_link import TwoLink, simulate, two_link
 from labs.random_numbers import uniform
 
 PERIOD = 0.05
@@ -57,9 +57,9 @@ class SwingUp:
         return len(self.torques)
 
     @cached_property
-    def joint_torques(self) -> np.ndarray:
-        """(nu, nq) [N m] of all joints."""
-        return np.asarray(self.torques @ self.mechanism.S.T)
+    def dynamics(self) -> TwoLink:
+        """Of the mechanism."""
+        return two_link(self.mechanism.model)
 
     def starts(self, random: np.ndarray, many: int) -> np.ndarray:
         n = self.mechanism.nq
@@ -74,21 +74,25 @@ class SwingUp:
         return np.concatenate(parts, axis=1, dtype=np.float32)
 
     def advance(self, X: np.ndarray, U: np.ndarray) -> np.ndarray:
-        n, body, h = self.mechanism.nq, self.mechanism, PERIOD / self.substeps
-        after, aba, model, data = X.copy(), pin.aba, body.model, body.data
-        for x, torque in zip(after, self.joint_torques[U], strict=True):
-            x[n:] += h * aba(model, data, x[:n], x[n:], torque)
-        after[:, n:] = np.clip(after[:, n:], -self.velocity_limit, self.velocity_limit)
-        after[:, :n] += h * after[:, n:]
-        return after
+        return self.hold(X, self.torques[U], 1)
 
     def step(self, X: np.ndarray, U: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        torques = self.torques[U]
+        return self.hold(X, torques), self.cost(X, torques), np.zeros(len(X), bool)
+
+    def cost(self, X: np.ndarray, torques: np.ndarray) -> np.ndarray:
+        """l (k,) of a step from X (k, nx) under any torques (k, motors) [N m]."""
         n, (w_q, w_v, w_u) = self.mechanism.nq, self.weights
         angle = np.remainder(X[:, :n] - self.goal + np.pi, 2.0 * np.pi) - np.pi
-        costs = angle**2 @ w_q + X[:, n:] ** 2 @ w_v + self.torques[U] ** 2 @ w_u
-        for _ in range(self.substeps):
-            X = self.advance(X, U)
-        return X, costs, np.zeros(len(X), bool)
+        return np.asarray(angle**2 @ w_q + X[:, n:] ** 2 @ w_v + torques**2 @ w_u)
+
+    def hold(self, X: np.ndarray, torques: np.ndarray, parts: int = substeps) -> np.ndarray:
+        """X (k, nx) so many parts of a step later, under torques (k, motors) [N m]."""
+        body, h = self.dynamics, PERIOD / self.substeps
+        tau = torques @ self.mechanism.S.T
+        return simulate(
+            body.joints, body.inertia, body.gravity, X, tau, self.velocity_limit, h, parts
+        )
 
 
 SWING_UPS: Mapping[str, str] = {"pendulum": "Pendulum", "double-pendulum": "Double pendulum"}

@@ -1,2 +1,0 @@
-"""Random walks of the literature as finite MDPs, for the labs of prediction, TD(lambda) and
-function approximation to come."""

@@ -1,5 +1,5 @@
 """Random walks along a line as finite MDPs (labs/problems/finite_mdp.py), for the labs of
-prediction, TD(lambda) and function approximation to come.
+prediction, TD(lambda) and function approximation.
 
 The states 1..n lie between the terminal states 0 and n + 1. A control is a jump of 1 to `reach`
 states to the left or right; the policy under study draws evenly among them. A jump beyond an end

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labs.algorithms.runge_kutta import Tableau
+from labs.algorithms.butcher_tableau import Tableau
 
 ROUNDING = 1e-12
 """A sum whose terms cancel to less than this share of their sizes is zero. Never less than a

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from labs.algorithms.approximation import shortest_solution
 from labs.algorithms.features import Features, add_features, evaluate
 from labs.algorithms.monte_carlo import costs_to_go
 from labs.compiled import compiled
@@ -58,15 +59,23 @@ def collect_transitions(task: PredictionTask, random: np.ndarray, episodes: int)
 
 
 def least_squares_fit(features: Features, batch: Transitions) -> np.ndarray:
-    """w (d,) of the least squares fit, the shortest where there are several."""
-    return _fit(features.dense[batch.x], batch.returns)
+    """w (d,) of the least squares fit, the shortest where there are several. All visits of a state
+    ask for the mean of their J."""
+    visits = np.bincount(batch.x, minlength=len(features.active))
+    seen = np.flatnonzero(visits)
+    root = np.sqrt(visits[seen])
+    sums = np.bincount(batch.x, batch.returns, minlength=len(visits))[seen]
+    return shortest_solution(features.dense[seen] * root[:, None], sums / root)
 
 
 def lstd(features: Features, batch: Transitions, gamma: float) -> np.ndarray:
     """w (d,) of LSTD, the shortest of least residual where there are several or none."""
-    phi = features.dense
-    here, ahead = phi[batch.x], phi[batch.y]
-    return _fit(here.T @ (here - gamma * ahead), here.T @ batch.cost)
+    phi, states = features.dense, len(features.active)
+    counts = np.zeros((states, states))
+    np.add.at(counts, (batch.x, batch.y), 1.0)
+    cost = np.bincount(batch.x, batch.cost, minlength=states)
+    A = phi.T @ (counts.sum(axis=1)[:, None] * phi - gamma * counts @ phi)
+    return shortest_solution(A, phi.T @ cost)
 
 
 def fitted_q_iteration(
@@ -79,7 +88,7 @@ def fitted_q_iteration(
     for u in range(len(w)):
         tried = batch.u == u
         if tried.any():
-            fitted[u] = _fit(phi[batch.x[tried]], targets[tried])
+            fitted[u] = shortest_solution(phi[batch.x[tried]], targets[tried])
     return fitted
 
 
@@ -118,10 +127,6 @@ def replay_q_learning(
     learned = np.array(w, float)
     _replay_q(features, batch, gamma, rule, learned, random, draws, drawn)
     return learned
-
-
-def _fit(A: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.asarray(np.linalg.lstsq(A, b, rcond=None)[0])
 
 
 def _check(batch: Transitions) -> None:

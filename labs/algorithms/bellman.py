@@ -83,9 +83,9 @@ def q_values(mdp: FiniteMDP, V: np.ndarray) -> np.ndarray:
         table: np.ndarray = mdp.C + mdp.gamma * V[mdp.successor]
         return table
     endless = ~np.isfinite(V)
-    Q: np.ndarray = mdp.C + mdp.gamma * (mdp.probabilities @ _finite(V)).T
+    Q: np.ndarray = mdp.C + mdp.gamma * mdp.expect(_finite(V))
     if endless.any():
-        Q[(mdp.probabilities @ endless.astype(float)).T > 0.0] = np.inf
+        Q[mdp.expect(endless.astype(float)) > 0.0] = np.inf
     return Q
 
 
@@ -123,7 +123,9 @@ def policy_backup(
     if policy.ndim == 1 and mdp.successor is not None:
         ahead = np.empty(mdp.X)
         return ahead, _policy_sweep(V, mdp.C, mdp.successor, mdp.gamma, policy, ahead), mdp.X
-    if policy.ndim == 1:
+    if policy.ndim == 1 and mdp.outcomes is not None:
+        ahead, backups = q_values(mdp, V)[np.arange(mdp.X), policy], mdp.X
+    elif policy.ndim == 1:
         rows = mdp.probabilities[policy, np.arange(mdp.X)]
         ahead, backups = mdp.policy_cost(policy) + mdp.gamma * (rows @ V), mdp.X
     else:

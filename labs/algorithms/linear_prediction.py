@@ -1,16 +1,18 @@
 """Incremental prediction with linear function approximation (notes, 3.7.2 and 3.7.3): steps down
 the squared error of one sample, v(x, w) = phi(x)' w.
 
-    gradient MC         w <- w + alpha (J_t - v(x_t)) phi(x_t)
+    oracle              w <- w + alpha (V(x_t) - v(x_t)) phi(x_t)
+    gradient MC         the same with J_t for V(x_t)
     semi-gradient TD    delta_t = l_t + gamma v(x_(t+1)) - v(x_t)
                         w <- w + alpha rho_t delta_t phi(x_t)
     n-step              the same with the n-step return for the target
     TD(lambda)          e <- rho_t (gamma lambda e + phi(x_t)),  w <- w + alpha delta_t e
 
-MC goes down the gradient of the value error and comes to its least. The others leave out that
-their target moves with w. On-policy they come near it all the same; off-policy, rho_t the
-importance ratio, they may diverge. The cure, beyond the notes, is a true gradient of another
-error (TDC; Sutton, Maei and others 2009), with second weights h that track delta:
+The first two go down the gradient of the value error and come to its least; only who knows the
+answer can be an oracle (3.7.2). The others leave out that their target moves with w. On-policy
+they come near it all the same; off-policy, rho_t the importance ratio, they may diverge. The cure,
+beyond the notes, is a true gradient of another error (TDC; Sutton, Maei and others 2009), with
+second weights h that track delta:
 
     TDC    w <- w + alpha rho (delta phi(x) - gamma phi(x') (h' phi(x)))
            h <- h + beta rho (delta - h' phi(x)) phi(x)
@@ -35,6 +37,22 @@ def _move(
     """v(x) towards a target."""
     count[0] += 1
     add_features(features, w, x, step_size(rule, count[0]) * (target - evaluate(features, w, x)))
+
+
+@compiled
+def gradient_oracle(
+    task: PredictionTask,
+    features: Features,
+    episode: Episode,
+    T: int,
+    rule: UpdateRule,
+    w: np.ndarray,
+    count: np.ndarray,
+) -> None:
+    """The true value of the policy asked for is the target, whichever is followed."""
+    for t in range(T):
+        x = episode.states[t]
+        _move(features, rule, w, count, x, task.truth[x])
 
 
 @compiled

@@ -11,11 +11,15 @@ from every state one path leads into a cycle, of states x_1, ..., x_L say, with 
 and back along the path V^pi(x) = l + gamma V^pi(x'). With gamma = 1 a state from which the policy
 never comes to rest at no cost has no finite cost-to-go: its value is infinite. Whether it comes to
 rest is decided on the graph of the chain that remains under the policy, as in `markov_chain`.
+Where the MDP knows which few outcomes there are, the system is solved as a sparse one.
 """
 
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.sparse import csr_array, eye_array
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import spsolve
 
 from labs.algorithms.bellman import Sweep, convergence_message, policy_backup, until_done
 from labs.algorithms.markov_chain import communicating_classes, cost_to_go
@@ -47,11 +51,32 @@ def exact(mdp: FiniteMDP, policy: np.ndarray) -> np.ndarray:
         rows = np.arange(mdp.X)
         _deterministic_value(mdp.C[rows, policy], mdp.successor[rows, policy], mdp.gamma, V)
         return V
+    if mdp.outcomes is not None:
+        return _sparse_value(mdp.sparse_chain(policy), mdp.policy_cost(policy), mdp.gamma)
     matrix, cost = mdp.transition_matrix(policy), mdp.policy_cost(policy)
     if mdp.gamma < 1.0:
         return np.asarray(np.linalg.solve(np.eye(mdp.X) - mdp.gamma * matrix, cost))
     found = cost_to_go(matrix, cost, mdp.gamma, communicating_classes(matrix))
     return np.where(found.finite, found.V, np.inf)
+
+
+def _sparse_value(P: csr_array, cost: np.ndarray, gamma: float) -> np.ndarray:
+    """V (X,) of a chain with the transition matrix P (X, X) and costs (X,)."""
+    endless, rest = np.zeros(len(cost), bool), np.zeros(len(cost), bool)
+    if gamma == 1.0:
+        count, label = connected_components(P, connection="strong")
+        closed, costly = np.ones(count, bool), np.zeros(count, bool)
+        start, end = (label[places] for places in P.nonzero())
+        closed[start[start != end]] = False
+        costly[label[cost != 0.0]] = True
+        rest, endless, found = closed[label], (closed & costly)[label], np.zeros(0)
+        while not np.array_equal(endless, found):
+            found, endless = endless, endless | (P @ endless.astype(float) > 0.0)
+    V, left = np.where(endless, np.inf, 0.0), ~endless & ~rest
+    if left.any():
+        system = eye_array(int(left.sum())) - gamma * P[left][:, left]
+        V[left] = spsolve(system.tocsc(), cost[left])
+    return V
 
 
 @compiled

@@ -9,7 +9,9 @@ than the tolerance) is policy iteration, which begins with evaluating a given po
 for a sweep that improves, X for one that evaluates.
 
 `optimum` is policy iteration with exact evaluation: finitely many steps, no tolerance (Howard
-1960).
+1960). With gamma = 1 it begins with a policy that is sure to end wherever one can be, and changes
+a control only for a cheaper one: so it never comes to one that runs for ever at no cost where
+ending pays (Bertsekas and Tsitsiklis 1991).
 """
 
 from collections.abc import Iterator
@@ -67,15 +69,36 @@ def iterate(
 
 def optimum(mdp: FiniteMDP, policy: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """V* (X,) and an optimal policy (X,) to rounding, and the improvements it took to get there
-    from `policy`, (X,) or (X, U). With gamma = 1 and random dynamics, that policy has to end from
-    wherever any can; V* is infinite from where none does."""
+    from `policy`, (X,) or (X, U). With gamma = 1 a random one gives way to one that is sure to
+    end, and V* is infinite from where none is, or where costs have no least sum."""
+    if policy.ndim == 2 and mdp.gamma == 1.0:
+        policy = _sure_to_end(mdp)
+    V = exact(mdp, policy)
     for count in range(MAX_IMPROVEMENTS):
-        V = exact(mdp, policy)
         with np.errstate(invalid="ignore"):  # infinite values that stay so do not change
             _, better, _ = optimal_backup(mdp, V, policy)
         if policy.ndim == 1 and (better == policy).all():
             return V, policy, count
-        policy = better
+        before, policy, V = V, better, exact(mdp, better)
+        if (np.isfinite(before) & ~np.isfinite(V)).any():  # cheaper and cheaper, round and round
+            return V, policy, count + 1
     raise LabError(
         f"policy iteration still changes the policy after {MAX_IMPROVEMENTS} improvements"
     )
+
+
+def _sure_to_end(mdp: FiniteMDP) -> np.ndarray:
+    """(X,): a policy that ends with probability 1 from wherever one can: by controls that lead
+    nowhere else, the shortest way."""
+    policy, sure = np.zeros(mdp.X, np.int64), np.ones(mdp.X, bool)
+    while True:
+        stays = mdp.expect((~sure).astype(float)) == 0.0
+        found, fresh = mdp.terminal, mdp.terminal
+        while fresh.any():
+            leads = stays & (mdp.expect(found.astype(float)) > 0.0)
+            fresh = leads.any(axis=1) & ~found
+            policy[fresh] = leads[fresh].argmax(axis=1)
+            found = found | fresh
+        if (found == sure).all():
+            return policy
+        sure = found

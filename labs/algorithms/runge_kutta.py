@@ -20,23 +20,18 @@ here, on x = (q, v); semi-implicit Euler treats q and v apart and is no Runge-Ku
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from fractions import Fraction
-from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 
-from labs.errors import LabError
+from labs.algorithms.butcher_tableau import ROUNDING, Tableau, parse_tableau
 
-MOST_STAGES = 6
-LARGEST_COEFFICIENT = 100.0
-"""Of the numbers in a tableau that is typed in."""
 NEWTON_STEPS = 25
 NEWTON_TOLERANCE = 1e-12
 """Newton stops when no component of the stage equations is off by more than this, relative to
 1 + the largest |f|."""
-ORDER_TOLERANCE = 1e-10
-"""A condition of order counts as met within this: room for fractions typed with 12 digits."""
+ORDER_TOLERANCE = ROUNDING
+"""A condition of order counts as met within this."""
 
 
 @dataclass(frozen=True)
@@ -45,24 +40,6 @@ class VectorField:
 
     f: Callable[[np.ndarray, float], np.ndarray]
     jacobian: Callable[[np.ndarray, float], np.ndarray]
-
-
-@dataclass(frozen=True, eq=False)
-class Tableau:
-    """Butcher's tableau: a (q, q), b (q,), c (q,)."""
-
-    a: np.ndarray
-    b: np.ndarray
-    c: np.ndarray
-
-    @property
-    def stages(self) -> int:
-        return len(self.b)
-
-    @cached_property
-    def explicit(self) -> bool:
-        """Whether a_ij = 0 for all j >= i."""
-        return not bool(np.triu(self.a).any())
 
 
 @dataclass(frozen=True)
@@ -132,40 +109,6 @@ def order(tableau: Tableau) -> int:
     return 4
 
 
-def parse_tableau(text: str) -> Tableau:
-    """A tableau as it is typed: one row a line (or after a semicolon), "c | a_i1 a_i2 ...", the
-    last one "| b_1 b_2 ...". Numbers are decimals or fractions; zeros at a row's end may be left
-    out. Raises LabError, its message a sentence that names the row."""
-    lines = [line.strip() for line in text.replace(";", "\n").splitlines() if line.strip()]
-    q = len(lines) - 1
-    if q < 1:
-        raise LabError(
-            "a tableau has at least two rows: 'c | a ...' for each stage and '| b ...' at the end"
-        )
-    if q > MOST_STAGES:
-        raise LabError(f"there are {q} rows of stages; at most {MOST_STAGES} are taken")
-    a, c = np.zeros((q, q)), np.zeros(q)
-    for i, line in enumerate(lines[:-1]):
-        left, weights = _row(line, f"row {i + 1}", q)
-        if len(left) != 1:
-            raise LabError(f"row {i + 1} ({line!r}) needs one number, c, before its bar '|'")
-        c[i] = left[0]
-        a[i, : len(weights)] = weights
-        if abs(a[i].sum() - c[i]) > ORDER_TOLERANCE:
-            raise LabError(
-                f"row {i + 1}: c = {c[i]:g} but its a add up to {a[i].sum():g}; "
-                "c_i is the sum of the a_ij"
-            )
-    left, b = _row(lines[-1], "the last row", q)
-    if left:
-        raise LabError(
-            f"the last row ({lines[-1]!r}) holds the weights b: nothing goes before its bar '|'"
-        )
-    if len(b) != q:
-        raise LabError(f"the last row has {len(b)} weights b; there are {q} stages")
-    return Tableau(a, np.array(b), c)
-
-
 def gauss_legendre(q: int) -> Tableau:
     """The implicit method of q stages and order 2q: collocation at the zeros of the Legendre
     polynomial, a_ij = integral of the j-th Lagrange polynomial from 0 to c_i, b_j to 1. q = 1 is
@@ -219,27 +162,6 @@ def _implicit_step(
         k = k - change.reshape(q, n)
     why = f"Newton's method found no stages in {iteration} steps: residual {residual:.1e}."
     return RungeKuttaStep(x + h * (tableau.b @ k), evaluations, iteration, residual, why)
-
-
-def _row(line: str, name: str, q: int) -> tuple[list[float], list[float]]:
-    """The numbers on both sides of a row's bar."""
-    left, bar, right = line.partition("|")
-    if not bar:
-        raise LabError(f"{name} ({line!r}) has no bar '|' between c and its weights")
-    numbers = [_number(word, name) for word in right.split()]
-    if len(numbers) > q:
-        raise LabError(f"{name} has {len(numbers)} weights; there are {q} stages")
-    return [_number(word, name) for word in left.split()], numbers
-
-
-def _number(word: str, name: str) -> float:
-    try:
-        value = float(Fraction(word.replace("−", "-")))
-    except (ValueError, ZeroDivisionError, OverflowError):
-        raise LabError(f"{name}: {word!r} is no number; write 0.25 or 1/4") from None
-    if abs(value) > LARGEST_COEFFICIENT:
-        raise LabError(f"{name}: {word} is beyond ±{LARGEST_COEFFICIENT:g}")
-    return value
 
 
 EULER = parse_tableau("0 | ; | 1")

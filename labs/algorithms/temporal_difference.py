@@ -16,7 +16,7 @@ as in `monte_carlo`."""
 
 import numpy as np
 
-from labs.compiled import compiled
+from labs.compiled import compiled, inlined
 from labs.problems.episodes import UpdateRule, step_size
 from labs.problems.prediction import Episode
 
@@ -45,12 +45,7 @@ def n_step(
     states, costs, returns = episode.states, episode.costs, episode.returns
     first = max(T - rule.n, 0)  # The first of the steps whose return reaches the end.
     for t in range(first):
-        x = states[t]
-        N[x] += 1
-        J = V[states[t + rule.n]]
-        for k in range(t + rule.n - 1, t - 1, -1):
-            J = costs[k] + gamma * J
-        learned[x] += step_size(rule, N[x]) * (J - V[x])
+        _learn_from_n_costs(gamma, episode, t, rule, V, N, learned)
     J = V[states[T]]
     for t in range(T - 1, first - 1, -1):
         J = costs[t] + gamma * J
@@ -61,3 +56,30 @@ def n_step(
         learned[x] += step_size(rule, N[x]) * (returns[t] - V[x])
     if rule.offline:
         V[:] = learned
+
+
+@compiled
+def n_step_so_far(
+    gamma: float, episode: Episode, T: int, rule: UpdateRule, V: np.ndarray, N: np.ndarray
+) -> None:
+    """What online n-step TD has learned after T steps of an episode that goes on."""
+    for t in range(T - rule.n + 1):
+        _learn_from_n_costs(gamma, episode, t, rule, V, N, V)
+
+
+@inlined
+def _learn_from_n_costs(
+    gamma: float,
+    episode: Episode,
+    t: int,
+    rule: UpdateRule,
+    V: np.ndarray,
+    N: np.ndarray,
+    learned: np.ndarray,
+) -> None:
+    x = episode.states[t]
+    N[x] += 1
+    J = V[episode.states[t + rule.n]]
+    for k in range(t + rule.n - 1, t - 1, -1):
+        J = episode.costs[k] + gamma * J
+    learned[x] += step_size(rule, N[x]) * (J - V[x])

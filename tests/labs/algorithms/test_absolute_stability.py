@@ -12,14 +12,8 @@ from labs.algorithms.absolute_stability import (
     reversed_characteristic,
     stability_boundary,
 )
-from labs.algorithms.runge_kutta import (
-    TABLEAUS,
-    Tableau,
-    VectorField,
-    order,
-    parse_tableau,
-    runge_kutta_step,
-)
+from labs.algorithms.butcher_tableau import Tableau, parse_tableau
+from labs.algorithms.runge_kutta import TABLEAUS, VectorField, order, runge_kutta_step
 
 R = {name: StabilityFunction.of(tableau) for name, tableau in TABLEAUS.items()}
 

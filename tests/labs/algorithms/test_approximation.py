@@ -8,6 +8,7 @@ import pytest
 from labs.algorithms import prediction
 from labs.algorithms.approximation import (
     GRADIENT_MC,
+    ORACLE,
     SEMI_GRADIENT_LAMBDA,
     SEMI_GRADIENT_N_STEP,
     SEMI_GRADIENT_TD,
@@ -33,7 +34,7 @@ from labs.errors import LabError
 from labs.problems.episodes import UpdateRule
 from labs.problems.finite_mdp import random_policy
 from labs.problems.prediction import PredictionTask
-from labs.tasks.counterexamples.linear import baird, two_states
+from labs.reinforcement_learning.function_approximation.counterexamples import baird, two_states
 from labs.tasks.random_walk.walks import (
     NINETEEN,
     THOUSAND,
@@ -90,7 +91,7 @@ def test_with_one_feature_a_state_it_is_the_table(
     np.testing.assert_allclose(by_weights.errors, by_table.errors[:, -1], rtol=1e-10)
 
 
-@pytest.mark.parametrize("method", range(5))
+@pytest.mark.parametrize("method", range(6))
 def test_learning_can_be_interrupted(method: int) -> None:
     task = walk_task(NINETEEN)
     features = vanishing(polynomials(np.linspace(0, 1, 21)[:, None], 3), task.task.terminal)
@@ -115,6 +116,9 @@ def test_monte_carlo_comes_to_the_best_fit_and_td_to_its_fixed_point() -> None:
     best = best_fit(task.truth, features.dense, mu)
     fixed = td_fixed_point(*mean_update(P, C, 1.0, features.dense, mu))
     mc = step(task, features, UpdateRule(2e-4), GRADIENT_MC, begin(task, features, 8), 10_000)
+    oracle = step(task, features, UpdateRule(2e-3), ORACLE, begin(task, features, 4), 4000)
+    np.testing.assert_allclose(oracle.w.mean(axis=0), best, atol=0.02)
+    assert oracle.errors.std() < 0.1 * mc.errors.std()
     start = init(task, features, best, 4, np.random.default_rng(0))
     td = step(task, features, UpdateRule(0.3, 0.5), SEMI_GRADIENT_TD, start, 10_000)
     np.testing.assert_allclose(mc.w.mean(axis=0), best, atol=0.05)

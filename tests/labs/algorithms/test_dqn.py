@@ -119,7 +119,7 @@ def test_the_pendulum_is_swung_up_after_twenty_thousand_steps() -> None:
     options = DqnOptions(cost_scale=10.0)
     starts = environment.starts(np.arange(1, 5, dtype=np.uint64), 50)
     costs = []
-    for _ in range(4):
-        agent = dqn.step(environment, options, agent, 320)
+    for _ in range(12):
+        agent = dqn.step(environment, options, agent, 100)
         costs.append(dqn.greedy_cost(environment, agent, starts).mean())
     assert min(costs) < 170.0

@@ -30,7 +30,7 @@ from labs.errors import LabError
 from labs.problems.episodes import UpdateRule, episodic_task
 from labs.problems.finite_mdp import FiniteMDP, random_policy
 from labs.random_numbers import seeded
-from labs.tasks.counterexamples.linear import baird
+from labs.reinforcement_learning.function_approximation.counterexamples import baird
 from labs.tasks.random_walk.walks import NINETEEN, visit_share, walk_mdp, walk_task
 from tests.labs.algorithms.learning_tasks import fresh, grid, optimum, random_mdp
 

@@ -5,18 +5,17 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import root
 
+from labs.algorithms.butcher_tableau import Tableau, parse_tableau
 from labs.algorithms.integrators import INTEGRATORS
 from labs.algorithms.runge_kutta import (
     EULER,
     MIDPOINT,
     RK4,
     TABLEAUS,
-    Tableau,
     VectorField,
     gauss_legendre,
     order,
     order_conditions,
-    parse_tableau,
     runge_kutta_integrate,
     runge_kutta_step,
 )
@@ -219,22 +218,88 @@ def test_a_tableau_is_read_as_it_is_written() -> None:
     assert not LOBATTO.explicit
 
 
+BOOKS = {
+    # Fehlberg 1969, Cash and Karp 1990, Dormand and Prince 1980, as books print them, with the
+    # orders of their first and their second row of weights.
+    "rkf45": (
+        """0 |
+1/4   | 1/4
+3/8   | 3/32       9/32
+12/13 | 1932/2197 -7200/2197 7296/2197
+1     | 439/216   -8         3680/513  -845/4104
+1/2   | -8/27      2        -3544/2565 1859/4104 -11/40
+---------------------------------------------------
+      | 25/216     0         1408/2565 2197/4104 -1/5
+      | 16/135     0         6656/12825 28561/56430 -9/50 2/55""",
+        (4, 5),
+    ),
+    "cash-karp": (
+        """\ufeff0 |
+1/5 | 1/5
+3/10 | 3/40, 9/40
+3/5 | 3/10, -9/10, 6/5
+1 | -11/54, 5/2, -70/27, 35/27
+7/8 | 1631/55296, 175/512, 575/13824, 44275/110592, 253/4096
+| 37/378, 0, 250/621, 125/594, 0, 512/1771
+| 2825/27648, 0, 18575/48384, 13525/55296, 277/14336, 1/4""",
+        (5, 4),
+    ),
+    "dormand-prince": (
+        r"""\begin{array}{c|ccccccc}
+0 & \\
+\frac{1}{5} & \frac{1}{5} \\
+\frac{3}{10} & \frac{3}{40} & \frac{9}{40} \\
+\frac{4}{5} & \frac{44}{45} & -\frac{56}{15} & \frac{32}{9} \\
+\frac{8}{9} & \frac{19372}{6561} & -\frac{25360}{2187} & \frac{64448}{6561} & -\frac{212}{729} \\
+1 & \frac{9017}{3168} & -\frac{355}{33} & \frac{46732}{5247} & \frac{49}{176} & -5103/18656 \\
+1 & 35/384 & 0 & 500/1113 & 125/192 & -2187/6784 & 11/84 \\ \hline
+& 35/384 & 0 & 500/1113 & 125/192 & -2187/6784 & 11/84 & 0 \\
+& 5179/57600 & 0 & 7571/16695 & 393/640 & -92097/339200 & 187/2100 & 1/40
+\end{array}""",
+        (5, 4),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BOOKS)
+@pytest.mark.parametrize("pick", [0, 1])
+def test_pairs_of_books_have_their_orders(name: str, pick: int, exact: np.ndarray) -> None:
+    text, orders = BOOKS[name]
+    tableau = parse_tableau(text, pick)
+    assert parse_tableau(tableau.text).text == tableau.text
+    assert order(tableau) == 4, "as far as it is told"
+    coarse, fine = (
+        np.linalg.norm(runge_kutta_integrate(tableau, FLOW, X0, 1.0 / k, k)[0] - exact)
+        for k in (12, 24)
+    )
+    assert np.log2(coarse / fine) == pytest.approx(orders[pick], abs=0.5)
+
+
+def test_decimals_of_nine_digits_are_near_enough() -> None:
+    rows = "0 |\n0.333333333 | 0.3333333337\n0.6666666667 | 0 0.666666667\n| 1/4 0 3/4"
+    assert order(parse_tableau(rows)) == 3
+    assert parse_tableau("0 |\n1 | 1\n| 0,5 0,5").b.tolist() == [0.5, 0.5]
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
         ("", "at least two rows"),
         ("| 1", "at least two rows"),
-        ("\n".join(["0 |"] * 7 + ["| 1"]), "7 rows of stages; at most 6"),
+        ("\n".join(["0 |"] * 8 + ["| 1"]), "8 rows of stages; at most 7"),
         ("0 |; 1/2 1/2; | 0 1", "row 2 ('1/2 1/2') has no bar"),
-        ("0 |; | 1/2; | 0 1", "row 2 ('| 1/2') needs one number, c"),
-        ("0 |; 1/2 | 1/3; | 0 1", "row 2: c = 0.5 but its a add up to 0.333333"),
+        ("0 |; 1/2 3 | 1/2; | 0 1", "row 2 ('1/2 3 | 1/2') needs one number, c"),
+        ("0 |; | 1/2; | 0 1", "row 2 of b has 2 weights; there are 1 stages"),
+        ("0 |; 1 | 1; | 0 1; | 0 1; | 0 1", "3 rows of weights b at the end"),
+        ("0 |; 1/2 | 1/3; | 0 1", "row 2: c = 0.5 but its a add up to 0.3333333333, -0.17 off"),
+        ("0 |; 1 | 1.0000001; | 0 1", "c = 1 but its a add up to 1.0000001, +1e-07 off"),
         ("0 |; 1/2 | 1/0; | 0 1", "row 2: '1/0' is no number"),
         ("0 |; 1/2 | half; | 0 1", "row 2: 'half' is no number"),
         ("0 |; nan | nan; | 0 1", "row 2: 'nan' is no number"),
         ("0 |; 1e9 | 1e9; | 0 1", "row 2: 1e9 is beyond"),
-        ("0 |; 1 | 1 0 0; | 0 1", "row 2 has 3 weights; there are 2 stages"),
+        ("0 |; 1 | 1 0 1; | 0 1", "row 2 has 3 weights; there are 2 stages"),
         ("0 |; 1/2 | 1/2; 1 | 0 1", "the last row ('1 | 0 1') holds the weights b"),
-        ("0 |; 1/2 | 1/2; | 1", "the last row has 1 weights b; there are 2 stages"),
+        ("0 |; 1/2 | 1/2; | 1/2", "the last row has 1 weights b; there are 2 stages"),
         ("0 |; 1/2 | 1/2; | 1 x", "the last row: 'x' is no number"),
     ],
 )

@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from labs.problems.finite_mdp import random_policy
 from labs.reinforcement_learning.dynamic_programming.side_by_side import RANDOM
 from labs.reinforcement_learning.dynamic_programming.tasks import TabularTask
-from labs.tasks.grid_world.map import GridWorld
+from labs.tasks.grid_world.cells import CellWorld
 from labs.tasks.grid_world.walk import GridWalk, advance_walk, choose_steps, is_on, start_walk
 from labs.tasks.pendulum_table.swing import (
     Swing,
@@ -24,7 +25,7 @@ PERIOD = 0.01
 MOVE, REST = 30, 100
 """Periods of a walker's step, and of a rest before it starts anew."""
 LONGEST = 120
-"""Steps after which a walker starts anew."""
+"""Steps after which a walker starts anew, or as many as there are states."""
 PUSH = 4.0
 """[rad/s] that a push gives the pendulum."""
 
@@ -66,7 +67,7 @@ def apply_push(task: TabularTask, follower: Follower, seed: int) -> Follower:
     """The pendulum gets PUSH, a walker finds itself in some other cell."""
     if isinstance(follower.walk, Swing):
         return replace(follower, walk=push(follower.walk, PUSH))
-    assert isinstance(task.place, GridWorld)
+    assert isinstance(task.place, CellWorld)
     rng = np.random.default_rng((seed, follower.draws))
     x = int(rng.choice(np.flatnonzero(~task.mdp.terminal)))
     return Follower(start_walk(task.place, MOVE, start=x), follower.draws + 1)
@@ -75,7 +76,7 @@ def apply_push(task: TabularTask, follower: Follower, seed: int) -> Follower:
 def carry_over(task: TabularTask, follower: Follower) -> Follower:
     """The same on a task that has changed; at the start where its cells are no longer there."""
     place, walk = task.place, follower.walk
-    if isinstance(place, GridWorld) and isinstance(walk, GridWalk):
+    if isinstance(place, CellWorld) and isinstance(walk, GridWalk):
         fits = is_on(place, walk)
     else:
         fits = isinstance(place, PendulumGrid) and isinstance(walk, Swing)
@@ -83,11 +84,11 @@ def carry_over(task: TabularTask, follower: Follower) -> Follower:
 
 
 def _start(task: TabularTask) -> GridWalk | Swing:
-    return start_walk(task.place, MOVE) if isinstance(task.place, GridWorld) else start_swing()
+    return start_walk(task.place, MOVE) if isinstance(task.place, CellWorld) else start_swing()
 
 
 def _is_over(task: TabularTask, walk: GridWalk | Swing) -> bool:
-    lost = isinstance(walk, GridWalk) and walk.steps >= LONGEST
+    lost = isinstance(walk, GridWalk) and walk.steps >= max(LONGEST, task.mdp.X)
     return lost or bool(task.mdp.terminal[task.state(walk.at[0])])
 
 
@@ -97,10 +98,11 @@ def _decide(task: TabularTask, follower: Follower, policy: np.ndarray, seed: int
         assert isinstance(place, PendulumGrid)
         walk = look_up_torques(place, mdp, policy[None], walk)
     else:
-        assert isinstance(place, GridWorld)
+        assert isinstance(place, CellWorld)
         rng = np.random.default_rng((seed, follower.draws))
         if policy[0] == RANDOM:
-            policy = np.full(mdp.X, rng.integers(mdp.U))
+            own = np.flatnonzero(random_policy(mdp)[task.state(walk.at[0])])
+            policy = np.full(mdp.X, own[rng.integers(len(own))])
         walk = choose_steps(place, mdp, policy[None], walk, rng.random)
     return replace(follower, walk=walk, draws=follower.draws + 1)
 

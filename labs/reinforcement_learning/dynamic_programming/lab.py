@@ -45,12 +45,15 @@ from labs.reinforcement_learning.dynamic_programming.tasks import (
 )
 from labs.scene import Scene
 from labs.tasks.grid_world.map import MAPS, GridWorld, grid_world
-from labs.tasks.grid_world.params import edit_map
-from labs.tasks.grid_world.picture import draw_board, draw_walkers, draw_way
+from labs.tasks.grid_world.params import BOOK_WORLDS, edit_map
+from labs.tasks.grid_world.picture import draw_board, draw_walkers, draw_way, value_span
 from labs.tasks.grid_world.walk import GridWalk, nominal_path
+from labs.tasks.mdp_table.params import TABLES
+from labs.tasks.mdp_table.picture import draw_states
+from labs.tasks.mdp_table.world import UNNAMED, TableWorld, table_world
 from labs.tasks.pendulum_table.picture import draw_table
 from labs.tasks.pendulum_table.swing import Swing
-from labs.tasks.pendulum_table.table import table_size
+from labs.tasks.pendulum_table.table import PendulumGrid, table_size
 
 
 @dataclass(kw_only=True)
@@ -89,6 +92,8 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         "Four by four": {"map": MAPS["4x4"], "gamma": 1.0, "shown": "evaluation"},
         "Cliff": {"map": MAPS["cliff"], "gamma": 1.0},
         "Windy": {"map": MAPS["windy"], "gamma": 1.0},
+        **BOOK_WORLDS,
+        "Taxicab": {"world": "table", "table": TABLES["Taxicab"], "gamma": 0.9},
         "Little time left": {"shown": "finite", "gamma": 1.0, "to_go": 9},
         "Pendulum": {"world": "pendulum", "gamma": 0.98},
         "Coarse pendulum": {"world": "pendulum", "gamma": 0.98, "nodes": 21},
@@ -203,7 +208,7 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         if params.shown != "finite":
             measured |= {"sweeps": float(at.count[row]), "backups": float(at.backups[-1, row])}
             measured["error"] = float(at.errors[-1, row]) if at.started[row] else np.nan
-        return {name: value for name, value in measured.items() if not np.isnan(value)}
+        return {name: value for name, value in measured.items() if np.isfinite(value)}
 
     def fields(
         self, params: DynamicProgrammingParams, state: DynamicProgrammingState
@@ -224,15 +229,27 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         self, params: DynamicProgrammingParams, state: DynamicProgrammingState
     ) -> Mapping[str, str]:
         mdp = state.tabular_task.mdp
+        place, (V, policy) = state.tabular_task.place, _shown(params, state)
         about = mdp.report([state.tabular_task.start])
         if mdp.terminal.any() and not mdp.can_end.all():
             about += f"\nFrom {int((~mdp.can_end).sum())} states no way leads to a goal."
-        return {"account": iteration_report(state.iterates, state.seconds), "about": about}
+        by_state = UNNAMED
+        if isinstance(place, GridWorld):
+            about = "\n".join([about, *place.notes])
+        elif isinstance(place, TableWorld):
+            about = "\n".join([about, *place.table.notes])
+            random = policy is None or policy[0] == RANDOM
+            by_state = place.describe(V, None if random else policy)
+        report = iteration_report(state.iterates, state.seconds)
+        return {"account": report, "about": about, "by_state": by_state}
 
-    def labels(self, params: DynamicProgrammingParams) -> Mapping[str, str]:
-        if params.world == "grid":
-            return {"across": "column", "up": "row from below"}
-        return {"across": "angle from upright [rad]", "up": "velocity [rad/s]"}
+    def labels(self, params: DynamicProgrammingParams) -> Mapping[str, str | tuple[str, ...]]:
+        states = table_world(params.table).table.states if params.world == "table" else ()
+        if params.world == "pendulum":
+            across, up = "angle from upright [rad]", "velocity [rad/s]"
+        else:
+            across, up = "column", "row from below"
+        return {"state_names": states, "across": across, "up": up}
 
     def draw(
         self, scene: Scene, params: DynamicProgrammingParams, state: DynamicProgrammingState
@@ -241,15 +258,20 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         V, policy = _shown(params, state)
         finite = params.shown == "finite"
         limit = V if finite else task.limits[params.row]
-        high = float(np.abs(limit[np.isfinite(limit)]).max(initial=0.0)) or 1.0
+        low, high = value_span(limit)
         if not isinstance(walk, GridWalk):
-            assert not isinstance(task.place, GridWorld)
+            assert isinstance(task.place, PendulumGrid)
             draw_table(scene, task.place, V, high, policy, walk)
             return
+        random = policy is not None and policy[0] == RANDOM
+        if isinstance(task.place, TableWorld):
+            draw_states(scene, task.place, V, (low, high), None if random else policy)
+            draw_walkers(scene, task.place, walk)
+            return
         assert isinstance(task.place, GridWorld)
-        if policy is not None and policy[0] == RANDOM:
+        if policy is not None and random:
             policy = unpack_policy(task.mdp, policy)
-        draw_board(scene, task.place, V, high, policy, relief=True)
+        draw_board(scene, task.place, V, high, policy, low=low, relief=True)
         draw_way(scene, task.place, nominal_path(task.place, task.solution[1]), 1)
         if finite:
             _, policies = finite_horizon(state.task, params.w_f)

@@ -5,8 +5,14 @@ from labs.reinforcement_learning.dynamic_programming.side_by_side import (
     ITERATION_METHODS,
     IterationSettings,
 )
-from labs.reinforcement_learning.dynamic_programming.tasks import HORIZON, grid_key, pendulum_key
-from labs.tasks.grid_world.params import MapText
+from labs.reinforcement_learning.dynamic_programming.tasks import (
+    HORIZON,
+    grid_key,
+    pendulum_key,
+    table_key,
+)
+from labs.tasks.grid_world.params import MAP_LENGTH, MapText
+from labs.tasks.mdp_table.params import TAXICAB, TableText
 
 POCKET = """\
 .............
@@ -16,12 +22,20 @@ S......#..G..
 .......#.....
 ...#####.....
 ............."""
-BRUSHES = {"#": "Wall, or none", "G": "Goal", "S": "Start", "C": "Cliff", ".": "Free"}
-
+BRUSHES = {
+    "#": "Wall, or none",
+    "G": "Goal",
+    "H": "Hole, or none",
+    "S": "Start",
+    "C": "Cliff, or none",
+    ".": "Free",
+}
+WORLDS = {"grid": "Grid world", "pendulum": "Pendulum", "table": "Your table"}
 
 WORLD = Group("World", effect="restart")
 GRID_WORLD = Group("Grid world", effect="solve", when={"world": "grid"})
 PENDULUM = Group("Pendulum", effect="solve", when={"world": "pendulum"})
+TABLE = Group("Table", effect="solve", when={"world": "table"})
 ITERATIONS = Group("Iterations", effect="solve")
 FINITE_HORIZON = Group("Finite horizon")
 TABLE_SIZE = Group("Curse of dimensionality")
@@ -30,23 +44,31 @@ TABLE_SIZE = Group("Curse of dimensionality")
 class DynamicProgrammingParams(Params):
     """What the user can turn."""
 
-    world: str = WORLD.choice(
-        "grid", {"grid": "Grid world", "pendulum": "Pendulum"}, "World", key=True
-    )
-    """A map to walk on, or a pendulum whose motor is too weak to lift it at once."""
+    world: str = WORLD.choice("grid", WORLDS, "World", key=True)
+    """A map to walk on, a pendulum whose motor is too weak to lift it at once, or a table of your
+    own."""
     gamma: float = WORLD.knob(
         0.95, 0.0, 1.0, r"\gamma", "", "Discount", step=0.005, effect="solve", key=True
     )
     """Weight of the next step's cost. Every sweep brings the error down by it, at least."""
-    map: MapText = GRID_WORLD.text(POCKET, "Map", rows=8)
-    """# wall, . free, S start, G goal, C cliff; a last row of digits is the wind upwards. Or click
-    on the cells."""
+    map: MapText = GRID_WORLD.text(POCKET, "Map", rows=8, max_length=MAP_LENGTH)
+    """# wall, . free, S start, G goal, H hole (an end for 100), C cliff, + and - ends that gain and
+    cost 1; a last row of digits is wind, upwards; below, costs of letters: m = cost 3, or
+    T = reward 5, end. Or click on the cells."""
     brush: str = GRID_WORLD.choice("#", BRUSHES, "A click makes", effect="live", key=True)
     """What a clicked cell becomes."""
     slip: float = GRID_WORLD.knob(0.0, 0.0, 0.8, "p", "", "Slip", step=0.01, key=True)
-    """Probability that a step goes in a direction drawn evenly instead."""
+    """Probability that a step goes elsewhere: in a direction drawn evenly, or sideways."""
+    sideways: bool = GRID_WORLD.toggle(False, "Slip to the sides only")
+    """Half of it to either side of the direction wanted, as in the worlds of many books."""
+    living: float = GRID_WORLD.knob(1.0, -0.1, 5.0, "l_{step}", "", "Cost of living", step=0.01)
+    """What any step costs, beside what the cell costs that it leads to."""
     kings: bool = GRID_WORLD.toggle(False, "Diagonal steps")
     """Eight controls, the king's moves, instead of four."""
+    table: TableText = TABLE.text(TAXICAB, "Your table", rows=8, max_length=4000, key=True)
+    """CSV or JSON, pasted or a file: from, action, to, probability, cost or reward, a row for each
+    transition; or state, action, cost, then a column for each state. Start: the first state; what
+    has no row is an end."""
     nodes: float = PENDULUM.knob(51, 11, 101, "n", "", "Grid size", step=2, key=True)
     """Angles, and as many velocities: the table has n² rows."""
     levels: float = PENDULUM.knob(5, 3, 11, "n_u", "", "Torque levels", step=2)
@@ -81,7 +103,9 @@ class DynamicProgrammingParams(Params):
         12, 0, HORIZON, "N-i", "steps", "Time to go", step=1, key=True
     )
     """How many steps are left."""
-    w_f: float = FINITE_HORIZON.knob(3.0, 0.0, 10.0, "w_f", "", "Final cost", step=0.1)
+    w_f: float = FINITE_HORIZON.knob(
+        3.0, 0.0, 10.0, "w_f", "", "Final cost", step=0.1, when={"world": ["grid", "pendulum"]}
+    )
     """Of each cell (each radian) left to the goal in a straight line."""
     joints: float = TABLE_SIZE.knob(6, 1, 7, "j", "", "Joints", step=1)
     """Of a robot whose table one would like to have."""
@@ -92,7 +116,10 @@ class DynamicProgrammingParams(Params):
     def task(self) -> str:
         """The key of the task."""
         if self.world == "grid":
-            return grid_key(self.map, self.kings, self.slip, self.gamma)
+            slip = (self.slip, self.sideways)
+            return grid_key(self.map, self.kings, *slip, self.living, self.gamma)
+        if self.world == "table":
+            return table_key(self.table, self.gamma)
         nodes, levels = (int(n) // 2 * 2 + 1 for n in (self.nodes, self.levels))
         return pendulum_key(nodes, levels, self.torque, self.w_v, self.w_u, self.gamma)
 

@@ -2,18 +2,22 @@
 
 import numpy as np
 
-from labs.plots import Curves, HeatMap, Line, Note, Plot, Readout, TimeSeries, Trace
+from labs.plots import Bars, Curves, HeatMap, Line, Note, Plot, Readout, TimeSeries, Trace
 from labs.reinforcement_learning.dynamic_programming.side_by_side import (
     ITERATION_METHODS,
 )
 from labs.reinforcement_learning.dynamic_programming.tasks import HORIZON, TabularTask
+from labs.tasks.grid_world.cells import CellWorld
 from labs.tasks.grid_world.map import GridWorld
 from labs.tasks.grid_world.policy_arrows import policy_arrows
+from labs.tasks.mdp_table.world import state_values
 from labs.tasks.pendulum_table.policy_arrows import torque_arrows
 from labs.tasks.pendulum_table.table import table_size
 
 JOINTS = np.arange(1.0, 8.0)
-PENDULUM = {"world": ("pendulum",)}
+PENDULUM, TABLE = {"world": ("pendulum",)}, {"world": ("table",)}
+MAPPED = {"world": ("grid", "pendulum")}
+AXES = ("{across}", "{up}")
 POINTS, PIXELS = 250, 51
 """Of a curve and along one side of a heat map, at most."""
 
@@ -59,8 +63,10 @@ PLOTS: tuple[Plot, ...] = (
     ),
     TimeSeries("Pendulum from upright", "rad", Line("angle", r"q - q^*"), when=PENDULUM),
     TimeSeries("Torque of the pendulum", "N·m", Line("torque", r"u"), when=PENDULUM),
-    HeatMap("Cost-to-go", "x", "y", "V", "{across}", "{up}", "V", gaps=True),
-    HeatMap("Policy", "x", "y", "V", "{across}", "{up}", "V", gaps=True, arrows="policy"),
+    HeatMap("Cost-to-go", "x", "y", "V", *AXES, "V", gaps=True, when=MAPPED),
+    HeatMap("Policy", "x", "y", "V", *AXES, "V", gaps=True, arrows="policy", when=MAPPED),
+    Bars("Cost-to-go by state", "state_V", "V", "", gaps=True, names="state_names", when=TABLE),
+    Note("Policy by state", "by_state", when=TABLE),
     Curves(
         "States of a table by joints",
         "joints j",
@@ -99,11 +105,11 @@ def table_maps(
     """V (X,), seen from above, NaN where there is none, and a policy, (X,) controls or (X, U)
     probabilities, if any, as arrows."""
     place, arrows, everywhere = task.place, np.zeros((0, 4)), np.full(task.mdp.X, True)
-    if isinstance(place, GridWorld):
+    if isinstance(place, CellWorld):
         rows, columns = place.shape
         x, y = np.arange(1.0, columns + 1), np.arange(1.0, rows + 1)
         values = place.on_map(V, np.nan)[::-1]
-        if policy is not None:
+        if policy is not None and isinstance(place, GridWorld):
             arrows = policy_arrows(place, policy, everywhere)
     else:
         every = -(-place.q_nodes // PIXELS)
@@ -111,7 +117,7 @@ def table_maps(
         values = V.reshape(place.shape)[::every, ::every].T
         if policy is not None and policy.ndim == 1:
             arrows = torque_arrows(place, policy, everywhere)
-    return {"x": x, "y": y, "V": values, "policy": arrows}
+    return {"x": x, "y": y, "V": values, "policy": arrows, "state_V": state_values(place, V)}
 
 
 def table_sizes(joints: int, nodes: int) -> dict[str, np.ndarray]:

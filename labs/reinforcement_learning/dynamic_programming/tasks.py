@@ -1,5 +1,5 @@
-"""What dynamic programming is tried on: a grid world or the pendulum's table, with its exact
-solution, and the values that the iterations begin with.
+"""What dynamic programming is tried on: a grid world, the pendulum's table or somebody's own, with
+its exact solution, and the values that the iterations begin with.
 
 A task is known by a text (JSON), so that what was computed for it can say which one it was.
 """
@@ -20,7 +20,9 @@ from labs.reinforcement_learning.dynamic_programming.side_by_side import (
     initial_iterates,
     unpack_policy,
 )
+from labs.tasks.grid_world.cells import CellWorld
 from labs.tasks.grid_world.map import GridWorld, grid_world
+from labs.tasks.mdp_table.world import table_world
 from labs.tasks.pendulum_table.table import PendulumGrid, pendulum_grid
 
 HORIZON = 40
@@ -32,12 +34,12 @@ class TabularTask:
     """An MDP, what it stands for, and its exact solution."""
 
     mdp: FiniteMDP
-    place: GridWorld | PendulumGrid
+    place: CellWorld | PendulumGrid
 
     @cached_property
     def initial_policy(self) -> np.ndarray:
         """pi_0 (X,): RANDOM on a grid, the motor off on a pendulum."""
-        control = RANDOM if isinstance(self.place, GridWorld) else self.mdp.U // 2
+        control = self.mdp.U // 2 if isinstance(self.place, PendulumGrid) else RANDOM
         return np.full(self.mdp.X, control, np.int16)
 
     @cached_property
@@ -54,21 +56,23 @@ class TabularTask:
 
     @cached_property
     def distance(self) -> np.ndarray:
-        """(X,): from each state straight to the goal [cells; rad], walls or not."""
+        """(X,): from each state straight to the goal [cells; rad], walls or not; of a table 0."""
         if isinstance(self.place, PendulumGrid):
             return np.asarray(np.abs(self.place.nodes[:, 0] - np.pi))
-        goals = self.place.cells[self.mdp.terminal]
+        if not isinstance(self.place, GridWorld):
+            return np.zeros(self.mdp.X)
+        goals = self.place.cells[self.place.goals]
         apart = self.place.cells[:, None] - goals[None]
         return np.asarray(np.linalg.norm(apart, axis=2).min(axis=1))
 
     @property
     def start(self) -> int:
-        """Where an episode begins: S, or hanging at rest."""
-        return self.place.start if isinstance(self.place, GridWorld) else self.state(np.zeros(2))
+        """Where an episode begins: S, the first row of a table, or hanging at rest."""
+        return self.place.start if isinstance(self.place, CellWorld) else self.state(np.zeros(2))
 
     def state(self, at: np.ndarray) -> int:
         """Of a cell (row, column), or of the node nearest to (q, v), (2,)."""
-        if isinstance(self.place, GridWorld):
+        if isinstance(self.place, CellWorld):
             return self.place.state(at)
         return int(self.place.state(at[:1], at[1:]))
 
@@ -85,7 +89,11 @@ def tabular_task(key: str) -> TabularTask:
     gamma = described["gamma"]
     if "map" in described:
         world = grid_world(described["map"], described["kings"])
-        return TabularTask(world.mdp(gamma, described["slip"]), world)
+        happens = (described[name] for name in ("slip", "sideways", "living"))
+        return TabularTask(world.mdp(gamma, *happens), world)
+    if "table" in described:
+        own = table_world(described["table"])
+        return TabularTask(own.mdp(gamma), own)
     nodes = described["nodes"]
     grid = pendulum_grid(
         q_nodes=nodes, v_nodes=nodes, levels=described["levels"], torque=described["torque"]
@@ -93,9 +101,17 @@ def tabular_task(key: str) -> TabularTask:
     return TabularTask(grid.mdp(gamma, 1.0, described["w_v"], described["w_u"]), grid)
 
 
-def grid_key(text: str, kings: bool, slip: float, gamma: float) -> str:
+def grid_key(
+    text: str, kings: bool, slip: float, sideways: bool, living: float, gamma: float
+) -> str:
     """Of a grid world."""
-    return json.dumps({"map": text, "kings": kings, "slip": slip, "gamma": gamma})
+    described = {"map": text, "kings": kings, "slip": slip, "sideways": sideways}
+    return json.dumps(described | {"living": living, "gamma": gamma})
+
+
+def table_key(text: str, gamma: float) -> str:
+    """Of a table."""
+    return json.dumps({"table": text, "gamma": gamma})
 
 
 def pendulum_key(
@@ -129,8 +145,8 @@ def warm_start(iterates: Iterates, old: str, new: str, cold: Iterates) -> Iterat
     cells or the same grid of angles and velocities; `cold` where they do not fit."""
     before, after, mdp = tabular_task(old).place, tabular_task(new).place, tabular_task(new).mdp
     V, policy = iterates.V, cold.policy.copy()
-    if isinstance(before, GridWorld) and isinstance(after, GridWorld):
-        if before.shape != after.shape:
+    if isinstance(before, CellWorld) and isinstance(after, CellWorld):
+        if type(before) is not type(after) or before.shape != after.shape:
             return cold
         on_map = np.stack([before.on_map(row) for row in V])
         V = np.where(mdp.terminal, 0.0, on_map[:, after.cells[:, 0], after.cells[:, 1]])

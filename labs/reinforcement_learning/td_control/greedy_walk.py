@@ -5,7 +5,7 @@ import numpy as np
 
 from labs.random_numbers import uniform
 from labs.reinforcement_learning.td_control.tasks import LearningTask
-from labs.tasks.grid_world.map import GridWorld
+from labs.tasks.grid_world.cells import CellWorld
 from labs.tasks.grid_world.walk import GridWalk, advance_walk, choose_steps, start_walk
 from labs.tasks.pendulum_table.swing import Swing, advance_swing, look_up_torques, start_swing
 
@@ -14,14 +14,14 @@ PERIOD = 0.01
 MOVE = 20
 """Periods of a walker's step."""
 LONGEST_WALK, LONGEST_SWING = 100, 80
-"""Decisions after which all start anew."""
+"""Decisions after which all start anew; walkers after as many as there are states, if more."""
 REST = 5
 """Decisions that walkers rest at the goal."""
 
 
 def start_greedy_walk(task: LearningTask, many: int) -> GridWalk | Swing:
     """All at the start, before the first decision."""
-    if isinstance(task.place, GridWorld):
+    if isinstance(task.place, CellWorld):
         return start_walk(task.place, MOVE, many)
     return start_swing(many)
 
@@ -32,10 +32,10 @@ def follow_greedy_policies(
     """One PERIOD later. `policies` (M, X) holds each one's controls; `random` (4,) uint64, of the
     steps' outcomes, changes in place."""
     place, mdp = task.place, task.mdp
-    if isinstance(place, GridWorld):
+    if isinstance(place, CellWorld):
         assert isinstance(walk, GridWalk)
         if walk.clock == 0:
-            if walk.steps >= LONGEST_WALK or walk.idle >= REST:
+            if walk.steps >= max(LONGEST_WALK, mdp.X) or walk.idle >= REST:
                 walk = start_walk(place, MOVE, len(policies))
             walk = choose_steps(place, mdp, policies, walk, lambda: uniform(random))
         return advance_walk(walk)

@@ -28,12 +28,18 @@ from labs.reinforcement_learning.td_control.training import (
 )
 from labs.scene import Scene
 from labs.tasks.grid_world.map import MAPS, GridWorld, grid_world
-from labs.tasks.grid_world.params import edit_map
-from labs.tasks.grid_world.picture import draw_board, draw_walkers, draw_way
+from labs.tasks.grid_world.params import BOOK_WORLDS, edit_map
+from labs.tasks.grid_world.picture import draw_board, draw_walkers, draw_way, value_span
 from labs.tasks.grid_world.walk import GridWalk, nominal_path
+from labs.tasks.mdp_table.params import TABLES
+from labs.tasks.mdp_table.picture import draw_states
+from labs.tasks.mdp_table.world import UNNAMED, TableWorld
 from labs.tasks.pendulum_table.picture import draw_table
 from labs.tasks.pendulum_table.swing import Swing
+from labs.tasks.pendulum_table.table import PendulumGrid
 
+ICE: Mapping[str, Value] = {"alpha": 1.0, "omega": 0.6, "epsilon": 0.3, "episodes": 2000.0}
+"""How to learn where much is left to chance: with steps that decrease."""
 OPTIMAL = 1e-9
 """A greedy walk that costs this much more than the best at most is one of the best."""
 
@@ -65,6 +71,15 @@ class TdControl(Lab[TdParams, TdState]):
         "Cliff": {},
         "Windy grid": {"map": MAPS["windy"], "episodes": 1000},
         "Room": {"map": MAPS["room"], "episodes": 250},
+        "FrozenLake": {**BOOK_WORLDS["FrozenLake"], **ICE},
+        "4 x 3 world": {**BOOK_WORLDS["4 x 3 world"], **ICE},
+        "Taxicab": {
+            "system": "table",
+            "table": TABLES["Taxicab"],
+            "gamma": 0.9,
+            "anywhere": True,
+            **ICE,
+        },
         "Pendulum": {
             "system": "pendulum",
             "second": "none",
@@ -156,12 +171,30 @@ class TdControl(Lab[TdParams, TdState]):
         shown = learner_maps(task, training["q"][m, s], training["visits"][m, s], control)
         return shown | learning_curves(task, training)
 
+    def results(self, params: TdParams, state: TdState) -> Mapping[str, np.ndarray]:
+        """Of every learner V and the number of the greedy control: (methods, learners, cells)."""
+        q = state.training["q"]
+        return {"V": q.min(axis=-1), "greedy_control": q.argmin(axis=-1)}
+
+    def notes(self, params: TdParams, state: TdState) -> Mapping[str, str]:
+        task, (m, s), by_state = params.task, params.view, UNNAMED
+        about = [task.mdp.report([task.start])]
+        if isinstance(task.place, GridWorld):
+            about += task.place.notes
+        elif isinstance(task.place, TableWorld):
+            about += task.place.table.notes
+            q = _current(params, state)["q"][m, s]
+            by_state = task.place.describe(q.min(axis=1), q.argmin(axis=1))
+        return {"about": "\n".join(about), "by_state": by_state}
+
     def labels(self, params: TdParams) -> Mapping[str, str | tuple[str, ...]]:
         names = [LEARNING_METHODS[name] for name in params.methods]
         if len(set(names)) < len(names):
             names = [f"{name}, {order}" for name, order in zip(names, ORDER, strict=True)]
-        grid = params.system == "grid"
+        grid, place = params.system == "grid", params.task.place
+        states = place.table.states if isinstance(place, TableWorld) else ()
         return {
+            "state_names": states,
             "method": tuple(names),
             "first": names[0],
             "second": names[1] if len(names) > 1 else "",
@@ -174,13 +207,18 @@ class TdControl(Lab[TdParams, TdState]):
         tables, known = training["q"][:, s], training["visits"][m, s].any(axis=1)
         V, policy = tables[m].min(axis=1), tables[m].argmin(axis=1)
         if isinstance(state.walk, Swing):
-            assert not isinstance(task.place, GridWorld)
+            assert isinstance(task.place, PendulumGrid)
             names = [LEARNING_METHODS[name] for name in params.methods]
             high = float(task.q_star.min(axis=1).max())
             draw_table(scene, task.place, V, high, policy, state.walk, names, known=known)
             return
+        low, high = _span(task, V)
+        if isinstance(task.place, TableWorld):
+            draw_states(scene, task.place, V, (low, high), policy)
+            draw_walkers(scene, task.place, state.walk)
+            return
         assert isinstance(task.place, GridWorld)
-        draw_board(scene, task.place, V, _dearest(task, V), policy, known=known)
+        draw_board(scene, task.place, V, high, policy, low=low, known=known)
         for i, q in enumerate(tables):
             draw_way(scene, task.place, nominal_path(task.place, q.argmin(axis=1)), i)
         draw_walkers(scene, task.place, state.walk)
@@ -201,10 +239,11 @@ def _current(params: TdParams, state: TdState) -> Training:
     return training if fits_task(training, task) else transfer(training, task, params.q0)
 
 
-def _dearest(task: LearningTask, V: np.ndarray) -> float:
-    """The top of the scale of colours: the largest estimate, within reason."""
-    best = float(task.q_star[task.compared].min(axis=1).max(initial=1.0))
-    return float(np.clip(V.max(), best, 3.0 * best))
+def _span(task: LearningTask, V: np.ndarray) -> tuple[float, float]:
+    """The ends of the scale of colours: the values to be learned, and above them the largest
+    estimate, within reason."""
+    low, high = value_span(task.q_star[task.compared].min(axis=1))
+    return low, float(np.clip(V.max(), high, max(high, 3.0 * high)))
 
 
 def _divergence_message(training: Training) -> str:

@@ -11,9 +11,11 @@ from labs.reinforcement_learning.td_control.tasks import (
     LearningTask,
     grid_task,
     pendulum_task,
+    table_task,
 )
 from labs.tasks.grid_world.map import MAPS
-from labs.tasks.grid_world.params import MapText
+from labs.tasks.grid_world.params import MAP_LENGTH, MapText
+from labs.tasks.mdp_table.params import TAXICAB, TableText
 
 LEARNING_METHODS = {
     "q-learning": "Q-learning",
@@ -29,7 +31,8 @@ EXPLORATIONS = {
     "follow": "Another controller drives",
 }
 """In the order of the numbers in labs/algorithms/exploration.py."""
-LEARNERS = {"grid": 10, "pendulum": 5}
+WORLDS = {"grid": "Grid world", "pendulum": "Pendulum", "table": "Your table"}
+LEARNERS = {"grid": 10, "pendulum": 5, "table": 10}
 """Of each method."""
 BATCHES = 250
 """Iterations of a training, or more while its episodes are long."""
@@ -52,15 +55,28 @@ def _either(method: str) -> When:
 class TdParams(Params):
     """What the user can turn."""
 
-    system: str = WORLD.choice(
-        "grid", {"grid": "Grid world", "pendulum": "Pendulum"}, "World", effect="restart", key=True
+    system: str = WORLD.choice("grid", WORLDS, "World", effect="restart", key=True)
+    """A walk to the goal of the map below, a pendulum that a weak motor swings up, or a table of
+    your own."""
+    map: MapText = WORLD.text(MAPS["cliff"], "Map", rows=8, max_length=MAP_LENGTH, when=GRID)
+    """S start, G goal, # wall, H hole (an end for 100), C cliff, . free, + and - ends that gain and
+    cost 1; a last row of digits is wind, upwards; below, costs of letters: m = cost 3, or
+    T = reward 5, end."""
+    table: TableText = WORLD.text(
+        TAXICAB, "Your table", rows=8, max_length=4000, effect="restart", when={"system": "table"}
     )
-    """A walk to the goal of the map below, or a pendulum that a weak motor swings up."""
-    map: MapText = WORLD.text(MAPS["cliff"], "Map", rows=8, when=GRID)
-    """S start, G goal, # wall, C cliff, . free; a last row of digits is wind, upwards."""
+    """CSV or JSON, pasted or a file: from, action, to, probability, cost or reward, a row for each
+    transition; or state, action, cost, then a column for each state. Start: the first state; what
+    has no row is an end."""
     brush: str = WORLD.choice(
         "G",
-        {"G": "moves the goal", "S": "moves the start", "#": "walls up", "C": "makes cliff"},
+        {
+            "G": "moves the goal",
+            "S": "moves the start",
+            "#": "walls up",
+            "H": "digs a hole",
+            "C": "makes cliff",
+        },
         "A click on a cell",
         effect="live",
         when=GRID,
@@ -68,8 +84,14 @@ class TdParams(Params):
     """And walls or cliff clicked once more are free again."""
     kings: bool = WORLD.toggle(False, "King's moves", effect="restart", when=GRID)
     """Diagonal steps too: eight controls instead of four."""
-    slip: float = WORLD.knob(0.0, 0.0, 0.5, r"p_{slip}", "", "Slip", step=0.01, when=GRID)
-    """Probability that a step on the grid goes wherever it likes."""
+    slip: float = WORLD.knob(0.0, 0.0, 0.8, r"p_{slip}", "", "Slip", step=0.01, when=GRID)
+    """Probability that a step on the grid goes wherever it likes, or sideways."""
+    sideways: bool = WORLD.toggle(False, "Slip to the sides only", when=GRID)
+    """Half of it to either side of the direction wanted, as in the worlds of many books."""
+    living: float = WORLD.knob(
+        1.0, -0.1, 5.0, "l_{step}", "", "Cost of living", step=0.01, when=GRID
+    )
+    """What any step costs, beside what the cell costs that it leads to."""
     gamma: float = WORLD.knob(1.0, 0.0, 1.0, r"\gamma", "", "Discount", step=0.01)
     """Of the next step's cost. The pendulum's task never ends: 0.99 at most there."""
     effort: float = WORLD.knob(
@@ -121,7 +143,8 @@ class TdParams(Params):
     episodes: float = LEARNING.knob(500, BATCHES, 2000, "K", "", "Episodes", scale="log", key=True)
     """Of one training, each of ten learners (pendulum: five); in about 250 batches."""
     explorer: str = EXPLORATION.choice("epsilon-greedy", EXPLORATIONS, "Exploration", key=True)
-    """Who decides while learning. The other controller walks along the top row, or is PD."""
+    """Who decides while learning. The other controller walks along the top row, is PD, or
+    takes what costs least at once."""
     epsilon: float = EXPLORATION.knob(
         0.1,
         0.0,
@@ -188,7 +211,10 @@ class TdParams(Params):
         if self.system == "pendulum":
             gamma = min(self.gamma, LARGEST_GAMMA)
             return pendulum_task(gamma, self.effort, self.anywhere)
-        return grid_task(self.map, self.kings, self.slip, self.gamma, self.anywhere)
+        if self.system == "table":
+            return table_task(self.table, self.gamma, self.anywhere)
+        happens = (self.slip, self.sideways, self.living)
+        return grid_task(self.map, self.kings, *happens, self.gamma, self.anywhere)
 
     @property
     def methods(self) -> list[str]:

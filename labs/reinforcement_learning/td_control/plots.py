@@ -2,18 +2,21 @@
 
 import numpy as np
 
-from labs.plots import Curves, HeatMap, Line, Plot, Readout, TimeSeries, Trace
+from labs.plots import Bars, Curves, HeatMap, Line, Note, Plot, Readout, TimeSeries, Trace
 from labs.reinforcement_learning.td_control.params import LEARNING_METHODS
 from labs.reinforcement_learning.td_control.tasks import LearningTask
 from labs.reinforcement_learning.td_control.training import CURVES, Training
+from labs.tasks.grid_world.cells import CellWorld
 from labs.tasks.grid_world.map import GridWorld
 from labs.tasks.grid_world.policy_arrows import policy_arrows
+from labs.tasks.mdp_table.world import state_values
 from labs.tasks.pendulum_table.policy_arrows import torque_arrows
 
 ORDER = ("first", "second")
 AXES = ("{across}", "{up}")
 SECOND = {"second": tuple(LEARNING_METHODS)}
 """Where there is a second method."""
+MAPPED, TABLE = {"system": ("grid", "pendulum")}, {"system": ("table",)}
 WINDOW = 10
 """Batches over which the cost of learning is averaged."""
 
@@ -33,10 +36,24 @@ PLOTS: tuple[Plot, ...] = (
     _curves("Cost of an episode while learning", "J", "online", "online_low", "online_high"),
     _curves("Cost of the greedy policy, median", "J", "offline"),
     _curves("Distance to Q*", "RMS; dashed: largest", "off", "most"),
-    HeatMap("Q of the learner shown", "x", "y", "q", *AXES, "Q", gaps=True),
-    HeatMap("Greedy policy", "x", "y", "value", *AXES, "min Q", gaps=True, arrows="policy"),
-    HeatMap("Visits", "x", "y", "visits", *AXES, "log₁₀(1 + n)", gaps=True),
-    HeatMap("Error of min Q", "x", "y", "error", *AXES, "|V − V*|", gaps=True),
+    HeatMap("Q of the learner shown", "x", "y", "q", *AXES, "Q", gaps=True, when=MAPPED),
+    HeatMap(
+        "Greedy policy", "x", "y", "value", *AXES, "min Q", gaps=True, arrows="policy", when=MAPPED
+    ),
+    HeatMap("Visits", "x", "y", "visits", *AXES, "log₁₀(1 + n)", gaps=True, when=MAPPED),
+    HeatMap("Error of min Q", "x", "y", "error", *AXES, "|V − V*|", gaps=True, when=MAPPED),
+    Bars(
+        "min Q by state",
+        "state_V",
+        "min Q",
+        "",
+        marks="best_V",
+        gaps=True,
+        names="state_names",
+        when=TABLE,
+    ),
+    Note("Greedy policy by state", "by_state", when=TABLE),
+    Note("The world", "about", when={"system": ("grid", "table")}),
     TimeSeries("Cost of the walk in the scene", "", Line("paid", "J"), select="method"),
     Readout("trained", "Episodes of each learner", "", whole=True),
     Readout("optimum", "Optimal cost", ""),
@@ -61,13 +78,16 @@ def learner_maps(
         "error": np.abs(value - best),
     }
     known = visits.sum(axis=1) > 0
-    if isinstance(task.place, GridWorld):
+    if isinstance(task.place, CellWorld):
         rows, columns = task.shape
         axes = {"x": np.arange(1.0, columns + 1), "y": np.arange(1.0, rows + 1)}
-        axes["policy"], upwards = policy_arrows(task.place, q.argmin(axis=1), known), -1
+        axes["policy"], upwards = np.zeros((0, 4)), -1
+        if isinstance(task.place, GridWorld):
+            axes["policy"] = policy_arrows(task.place, q.argmin(axis=1), known)
     else:
         axes = {"x": task.place.angles, "y": task.place.velocities}
         axes["policy"], upwards = torque_arrows(task.place, q.argmin(axis=1), known), 1
+    axes |= {"state_V": state_values(task.place, value), "best_V": state_values(task.place, best)}
     return axes | {name: task.on_map(of, np.nan)[::upwards] for name, of in values.items()}
 
 

@@ -1,5 +1,5 @@
-"""What is learned in the lab of model-free control: grid worlds and the pendulum swung up, each
-with its exact answer from dynamic programming and a controller to look over the shoulder of."""
+"""What is learned in the lab of model-free control: grid worlds, the pendulum swung up and tables,
+each with its exact answer from dynamic programming and a controller to look over its shoulder."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,10 +11,12 @@ from labs.algorithms import policy_iteration
 from labs.algorithms.bellman import q_values
 from labs.problems.episodes import EpisodicTask, episodic_task
 from labs.problems.finite_mdp import FiniteMDP, random_policy
+from labs.tasks.grid_world.cells import CellWorld
 from labs.tasks.grid_world.map import GridWorld, grid_world
+from labs.tasks.mdp_table.world import table_world
 from labs.tasks.pendulum_table.table import PendulumGrid, pendulum_grid
 
-HORIZONS: Mapping[str, int] = {"grid": 500, "pendulum": 100}
+HORIZONS: Mapping[str, int] = {"grid": 500, "pendulum": 100, "table": 100}
 """An episode is cut after these."""
 PENDULUM = pendulum_grid(rods=1, q_nodes=41, v_nodes=31, levels=5)
 """1271 states, 5 torques, 0.1 s a step. Its motor lifts half of what it takes to hold it level."""
@@ -29,7 +31,7 @@ class LearningTask:
     """What is to be learned."""
 
     mdp: FiniteMDP
-    place: GridWorld | PendulumGrid
+    place: CellWorld | PendulumGrid
     learning: EpisodicTask
     """Episodes as they are learned from."""
     evaluation: EpisodicTask
@@ -65,12 +67,29 @@ class LearningTask:
 
 
 @lru_cache(maxsize=16)
-def grid_task(text: str, kings: bool, slip: float, gamma: float, anywhere: bool) -> LearningTask:
+def grid_task(
+    text: str,
+    kings: bool,
+    slip: float,
+    sideways: bool,
+    living: float,
+    gamma: float,
+    anywhere: bool,
+) -> LearningTask:
     """A walk to the goal."""
     world = grid_world(text, kings)
-    mdp = world.mdp(gamma, slip)
+    mdp = world.mdp(gamma, slip, sideways, living)
     maps = (world.shape, world.cells)
     return _task(mdp, world, world.start, anywhere, HORIZONS["grid"], cautious_policy(world), *maps)
+
+
+@lru_cache(maxsize=16)
+def table_task(text: str, gamma: float, anywhere: bool) -> LearningTask:
+    """What a table says, from its first state on."""
+    world = table_world(text)
+    mdp = world.mdp(gamma)
+    teacher, maps = mdp.C.argmin(axis=1), (world.shape, world.cells)
+    return _task(mdp, world, world.start, anywhere, HORIZONS["table"], teacher, *maps)
 
 
 @lru_cache(maxsize=8)
@@ -87,8 +106,7 @@ def pendulum_task(gamma: float, effort: float, anywhere: bool) -> LearningTask:
 
 def cautious_policy(world: GridWorld) -> np.ndarray:
     """(X,) int64: up to the top row, along it, and down in the column of the (first) goal."""
-    goal = next(x for x in range(len(world.cells)) if world.kind(x) == "G")
-    column = int(world.cells[goal][1])
+    column = int(world.cells[np.argmax(world.goals)][1])
     policy = np.zeros(len(world.cells), np.int64)
     for x, (row, here) in enumerate(world.cells):
         if here == column:
@@ -108,7 +126,7 @@ def pd_policy(grid: PendulumGrid) -> np.ndarray:
 
 def _task(
     mdp: FiniteMDP,
-    place: GridWorld | PendulumGrid,
+    place: CellWorld | PendulumGrid,
     start: int,
     anywhere: bool,
     horizon: int,

@@ -113,6 +113,40 @@ def angles(world: World, seconds: float) -> np.ndarray:
     return np.asarray(np.abs(world.recording().channels["angle"][begin:]))
 
 
+@ARTICLE.verify("The price of life")
+def test_how_dear_life_is_decides_the_way(setting: Setting) -> None:
+    def controls(living: float) -> tuple[int, float]:
+        """In the bottom row beside its last cell; and V of the start."""
+        world = solved({**setting, "living": living})
+        place, at = world.state.tabular_task.place, world.state.iterates
+        return int(at.policy[3][place.state((2, 2))]), float(at.V[3][place.start])
+
+    up, right, left = 0, 1, 3
+    way, value = controls(0.04)
+    assert way == left
+    assert value == pytest.approx(-0.705, abs=5e-4)
+    assert controls(0.1)[0] == up
+    world = solved({**setting, "living": 2.0})
+    place, policy = world.state.tabular_task.place, world.state.iterates.policy[3]
+    assert policy[place.state((1, 2))] == right, "into the -"
+    assert ARTICLE.answer("The price of life") == "Left, all the way round."
+
+
+@ARTICLE.verify("Where does a taxi wait?")
+def test_a_taxi_waits_at_the_stand(setting: Setting) -> None:
+    world = solved(setting)
+    place, mdp = world.state.tabular_task.place, world.state.tabular_task.mdp
+    np.testing.assert_allclose(-mdp.C[0], [8.0, 2.75, 4.25])
+    assert -mdp.C[1, 1] == 15.0
+    at = world.state.iterates
+    np.testing.assert_allclose(-at.V[3], [121.65, 135.31, 122.84], atol=5e-3)
+    doing = [place.table.control(x, u) for x, u in enumerate(at.policy[3])]
+    assert doing == ["stand"] * 3
+    short = solved({**setting, "gamma": 0.0}).state.iterates
+    assert [place.table.control(x, u) for x, u in enumerate(short.policy[3])] == ["cruise"] * 3
+    assert ARTICLE.answer("Where does a taxi wait?") == "Wait at the stand."
+
+
 @ARTICLE.verify("Swing up by table")
 def test_the_table_swings_the_pendulum_up(setting: Setting) -> None:
     world = solved(setting)

@@ -24,7 +24,7 @@ from labs.tasks.grid_world.map import MAPS, GridWorld
 from labs.tasks.grid_world.walk import GridWalk, nominal_path
 from labs.tasks.pendulum_table.swing import Swing
 
-ROOM = tabular_task(grid_key(MAPS["room"], False, 0.0, 0.9))
+ROOM = tabular_task(grid_key(MAPS["room"], False, 0.0, False, 1.0, 0.9))
 PENDULUM = tabular_task(pendulum_key(21, 3, 2.5, 0.05, 0.05, 0.9))
 
 
@@ -69,7 +69,7 @@ def test_who_gets_lost_starts_anew_and_who_has_nothing_to_do_rests() -> None:
 
 
 def test_a_fall_leads_back() -> None:
-    task = tabular_task(grid_key(MAPS["cliff"], False, 0.0, 1.0))
+    task = tabular_task(grid_key(MAPS["cliff"], False, 0.0, False, 1.0, 1.0))
     right = np.ones(38, np.int64)
     at = followed(task, start_follower(task), right, MOVE)
     np.testing.assert_array_equal(at.walk.at[0], [3, 0])
@@ -106,11 +106,11 @@ def test_a_walk_goes_on_while_its_cells_are_there() -> None:
     at = start_follower(ROOM, draws=3)
     assert carry_over(ROOM, at) is at
     elsewhere = GridWorld.parse(MAPS["room"]).with_cell(3, 3, "S").with_cell(0, 0, "#")
-    other = tabular_task(grid_key(elsewhere.text, False, 0.0, 0.9))
+    other = tabular_task(grid_key(elsewhere.text, False, 0.0, False, 1.0, 0.9))
     moved = carry_over(other, at)
     np.testing.assert_array_equal(moved.walk.at[0], [3, 3])
     assert moved.draws == 3
-    small = tabular_task(grid_key("SG", False, 0.0, 0.9))
+    small = tabular_task(grid_key("SG", False, 0.0, False, 1.0, 0.9))
     assert isinstance(ROOM.place, GridWorld)
     corner = ROOM.place.cells[-1:]
     far = Follower(GridWalk(corner, corner, np.zeros(1), corner[None], MOVE))

@@ -13,18 +13,20 @@ from labs.reinforcement_learning.dynamic_programming.tasks import (
 )
 from labs.tasks.grid_world.map import MAPS
 
-ROOM = grid_key(MAPS["room"], False, 0.0, 0.9)
+ROOM = grid_key(MAPS["room"], False, 0.0, False, 1.0, 0.9)
 PENDULUM = pendulum_key(21, 3, 2.5, 0.05, 0.05, 0.9)
 
 
 def test_a_task_is_made_once() -> None:
-    assert tabular_task(ROOM) is tabular_task(grid_key(MAPS["room"], False, 0.0, 0.9))
-    assert tabular_task(ROOM) is not tabular_task(grid_key(MAPS["room"], False, 0.1, 0.9))
+    assert tabular_task(ROOM) is tabular_task(grid_key(MAPS["room"], False, 0.0, False, 1.0, 0.9))
+    assert tabular_task(ROOM) is not tabular_task(
+        grid_key(MAPS["room"], False, 0.1, False, 1.0, 0.9)
+    )
     assert tabular_task(ROOM).solution is tabular_task(ROOM).solution
 
 
 def test_distances_are_straight() -> None:
-    task = tabular_task(grid_key("S#.\n...\nG..", False, 0.0, 1.0))
+    task = tabular_task(grid_key("S#.\n...\nG..", False, 0.0, False, 1.0, 1.0))
     assert task.distance[task.start] == 2.0
     assert task.distance[1] == pytest.approx(np.sqrt(8.0)), "walls or not"
     swinging = tabular_task(PENDULUM)
@@ -35,8 +37,8 @@ def test_distances_are_straight() -> None:
 
 
 def test_a_warm_start_carries_values_over_by_cells() -> None:
-    old = grid_key("S..\n..G", False, 0.0, 0.9)
-    new = grid_key("S#.\n..G", False, 0.0, 0.9)
+    old = grid_key("S..\n..G", False, 0.0, False, 1.0, 0.9)
+    new = grid_key("S#.\n..G", False, 0.0, False, 1.0, 0.9)
     at = cold_start(old, 7, 5.0)
     assert at.V[0].max() > 0.0
     found = warm_start(at, old, new, cold_start(new, 7, 5.0))
@@ -44,7 +46,7 @@ def test_a_warm_start_carries_values_over_by_cells() -> None:
     assert (found.count == 0).all()
     other = cold_start(PENDULUM, 7, 5.0)
     assert warm_start(at, old, PENDULUM, other) is other
-    larger = grid_key("S...\n...G", False, 0.0, 0.9)
+    larger = grid_key("S...\n...G", False, 0.0, False, 1.0, 0.9)
     cold = cold_start(larger, 7, 5.0)
     assert warm_start(at, old, larger, cold) is cold
     heavier = pendulum_key(21, 3, 2.0, 0.05, 0.05, 0.9)

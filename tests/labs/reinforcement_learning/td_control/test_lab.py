@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from labs.algorithms.policy_evaluation import exact
 from labs.engine.catalog import find
 from labs.engine.run import World
 from labs.errors import ParameterError
@@ -298,7 +299,7 @@ def test_clicks_that_mean_nothing_change_nothing_or_say_why() -> None:
 
 def test_a_map_is_checked_where_it_is_typed() -> None:
     with pytest.raises(ParameterError, match="row 2 of the map"):
-        TdParams().change({"map": "S..\n.x.\n..G"})
+        TdParams().change({"map": "S..\n.?.\n..G"})
 
 
 def test_walkers_follow_the_greedy_way_and_set_out_again() -> None:
@@ -333,6 +334,21 @@ def test_an_endless_world_has_no_optimum_and_says_nothing_of_it() -> None:
     assert np.isnan(fields["error"]).all(), "no cell is compared with what does not exist"
     assert np.isnan(fields["visits"]).tolist() == [[False, False, True, False]]
     assert len(fields["best_y"]) == 0
+
+
+@EXPERIMENTS.verify("Thin ice")
+def test_on_thin_ice_one_walks_into_the_edge(setting: Mapping[str, Value]) -> None:
+    world = world_of(setting)
+    task, left = params_of(world).task, 3
+    best = -task.q_star[task.start]
+    assert best.argmax() == left
+    assert LAB.measure(params_of(world), world.state)["optimum"] == pytest.approx(-0.542, abs=5e-4)
+    policies = world.state.training["q"][0].argmin(axis=2)
+    assert (policies[:, task.start] == left).all()
+    worth = np.sort([-exact(task.mdp, policy)[task.start] for policy in policies])
+    assert worth[5] > 0.525, "at least five"
+    assert worth[-1] <= best.max() + 1e-12
+    assert EXPERIMENTS.answer("Thin ice") == "Left, into the edge."
 
 
 def test_the_best_policy_costs_the_optimum_and_not_what_an_episode_of_it_costs() -> None:

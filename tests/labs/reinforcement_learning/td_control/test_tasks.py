@@ -28,21 +28,21 @@ def residual(task: LearningTask) -> float:
 @pytest.mark.parametrize("name", list(MAPS))
 @pytest.mark.parametrize("slip", [0.0, 0.3])
 def test_the_optimum_of_a_grid_is_a_fixed_point(name: str, slip: float) -> None:
-    task = grid_task(MAPS[name], False, slip, 1.0, True)
+    task = grid_task(MAPS[name], False, slip, False, 1.0, 1.0, True)
     assert residual(task) < 1e-9
     assert (task.compared == ~task.mdp.terminal).all()
 
 
 def test_the_published_optima() -> None:
     for name, best in (("cliff", 13.0), ("windy", 15.0)):
-        task = grid_task(MAPS[name], False, 0.0, 1.0, False)
+        task = grid_task(MAPS[name], False, 0.0, False, 1.0, 1.0, False)
         assert task.q_star[task.start].min() == best
-    kings = grid_task(MAPS["windy"], True, 0.0, 1.0, False)
+    kings = grid_task(MAPS["windy"], True, 0.0, False, 1.0, 1.0, False)
     assert kings.q_star[kings.start].min() == 7.0
 
 
 def test_the_cautious_controller_takes_seventeen_steps_past_the_cliff() -> None:
-    task = grid_task(MAPS["cliff"], False, 0.0, 1.0, False)
+    task = grid_task(MAPS["cliff"], False, 0.0, False, 1.0, 1.0, False)
     x, cost = task.start, 0.0
     while not task.mdp.terminal[x]:
         u = task.teacher[x]
@@ -52,7 +52,7 @@ def test_the_cautious_controller_takes_seventeen_steps_past_the_cliff() -> None:
 
 
 def test_the_cautious_controller_gives_way_to_walls() -> None:
-    task = grid_task("..G\n.#.\nS..", False, 0.0, 1.0, False)
+    task = grid_task("..G\n.#.\nS..", False, 0.0, False, 1.0, 1.0, False)
     assert task.teacher[GridWorld.parse("..G\n.#.\nS..").state((2, 1))] == 1, (
         "under the wall it goes aside"
     )
@@ -78,21 +78,21 @@ def test_the_pendulum_lies_on_its_map_with_angles_along_the_rows() -> None:
 
 def test_a_grid_lies_on_its_map_as_it_is_written() -> None:
     world = GridWorld.parse(MAPS["room"])
-    task = grid_task(MAPS["room"], False, 0.0, 1.0, False)
+    task = grid_task(MAPS["room"], False, 0.0, False, 1.0, 1.0, False)
     values = np.arange(1.0, task.mdp.X + 1)
     assert np.array_equal(task.on_map(values), world.on_map(values))
     assert np.array_equal(task.cells, world.cells)
 
 
 def test_errors_are_zero_at_the_optimum_only() -> None:
-    task = grid_task(MAPS["cliff"], False, 0.0, 1.0, False)
+    task = grid_task(MAPS["cliff"], False, 0.0, False, 1.0, 1.0, False)
     assert task.errors(task.q_star) == (0.0, 0.0)
     off = task.q_star.copy()
     off[task.start, 0] += 3.0
     mean, most = task.errors(off)
     assert most == 3.0
     assert mean == pytest.approx(3.0 / np.sqrt(37 * 4))
-    endless = grid_task("S#G", False, 0.0, 1.0, False)
+    endless = grid_task("S#G", False, 0.0, False, 1.0, 1.0, False)
     assert endless.errors(np.zeros((2, 4))) == (0.0, 0.0)
 
 

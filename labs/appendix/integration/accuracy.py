@@ -15,15 +15,10 @@ from labs.algorithms.absolute_stability import (
     measured_stability_limit,
     stability_boundary,
 )
+from labs.algorithms.butcher_tableau import Tableau, parse_tableau
 from labs.algorithms.discretisation import linear_step
 from labs.algorithms.integrators import semi_implicit_euler
-from labs.algorithms.runge_kutta import (
-    TABLEAUS,
-    RungeKuttaStep,
-    Tableau,
-    parse_tableau,
-    runge_kutta_step,
-)
+from labs.algorithms.runge_kutta import TABLEAUS, RungeKuttaStep, runge_kutta_step
 from labs.appendix.integration.convergence import (
     OneStepMethod,
     exact_solution,

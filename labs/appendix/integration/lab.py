@@ -13,7 +13,11 @@ from labs.appendix.integration.accuracy import (
     one_step_method,
     tableau_of,
 )
-from labs.appendix.integration.params import METHOD_NAMES, IntegrationParams
+from labs.appendix.integration.params import (
+    DORMAND_PRINCE,
+    METHOD_NAMES,
+    IntegrationParams,
+)
 from labs.appendix.integration.picture import draw_pendulums, tip_position
 from labs.appendix.integration.plots import PLOTS, error_fields, stability_fields
 from labs.arrays import with_row
@@ -72,6 +76,7 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
         "Small steps": {"h": 0.005},
         "Double pendulum": {"system": "double-pendulum", "start": 1.5, "h": 0.02},
         "Strong friction": {"friction": 2.0, "h": 0.1},
+        "Dormand-Prince": {"tableau": DORMAND_PRINCE},
         "Gauss-Legendre": {"implicit": "gauss-legendre", "h": 0.2},
     }
 
@@ -150,7 +155,7 @@ class Integration(Lab[IntegrationParams, IntegrationState]):
         return replace(state, **snapshot.data)
 
     def measure(self, params: IntegrationParams, state: IntegrationState) -> Measurement:
-        plant, yours = params.plant, tableau_of(params.tableau)
+        plant, yours = params.plant, tableau_of(params.own_tableau)
         fall = plant.energy(np.eye(2 * params.rods)[0] * np.pi)
         initial = plant.energy(params.x0())
         measured: dict[str, float | np.ndarray] = {

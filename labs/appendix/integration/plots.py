@@ -119,7 +119,7 @@ def stability_fields(params: IntegrationParams, limits: np.ndarray) -> Mapping[s
         "h_line": np.array([0.0, HIGHEST_GROWTH]),
         "z_re": z.real,
         "z_im": z.imag,
-        "conditions": order_conditions(tableau_of(params.tableau)),
+        "conditions": order_conditions(tableau_of(params.own_tableau)),
     }
     for name in METHOD_NAMES:
         if name != "semi":  # it is no Runge-Kutta method

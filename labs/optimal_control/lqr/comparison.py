@@ -16,6 +16,7 @@ COMPARED_HORIZONS: Mapping[str, tuple[int, ...]] = {
     "pendulum": _MANY,
     "mass": _MANY,
     "ur5": _FEW,
+    "own": _FEW,
 }
 """N of each system, as far as least squares takes a few hundredths of a second."""
 HORIZON_COUNT = 7

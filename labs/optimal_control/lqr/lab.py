@@ -11,8 +11,9 @@ from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.models.plant import Force
 from labs.optimal_control.lqr.comparison import COMPARED_HORIZONS, HORIZON_COUNT, compare
 from labs.optimal_control.lqr.linear_systems import SIMULATION_STEP, LinearSystem
+from labs.optimal_control.lqr.own_system import OwnSystem
 from labs.optimal_control.lqr.params import LqrParams
-from labs.optimal_control.lqr.picture import clip_norm, draw_regulated
+from labs.optimal_control.lqr.picture import clip_norm, draw_regulated, draw_states
 from labs.optimal_control.lqr.plots import (
     PLOTS,
     closed_loop_fields,
@@ -92,6 +93,7 @@ class Lqr(Lab[LqrParams, LqrState]):
         "Cart-pole, over again": {"policy": "window", "horizon": 80.0, "alpha": 0.0},
         "Pendulum, weak motor": {"system": "pendulum", "limit": 4.0, "r": 1.0, "push_force": 8.0},
         "Mass on a line": {"system": "mass", "deviation": 1.0, "push_force": 5.0},
+        "Your matrices": {"system": "own", "period": 0.1},
         "UR5": {
             "system": "ur5",
             "q_turn": 1000.0,
@@ -110,9 +112,11 @@ class Lqr(Lab[LqrParams, LqrState]):
     def init(self, params: LqrParams, rng: np.random.Generator) -> LqrState:
         """At rest, off by the deviation: the pole, the pendulum, the mass or every joint."""
         system = params.linear_system
-        nq = system.mechanism.nq
         x = system.x_eq.copy()
-        x[0 if params.system == "ur5" else nq - 1 : nq] += params.deviation
+        if isinstance(system, OwnSystem):
+            x += system.x0
+        else:
+            x[0 if params.system == "ur5" else system.nq - 1 : system.nq] += params.deviation
         return LqrState(
             x=x,
             u=system.u_eq.copy(),
@@ -134,20 +138,25 @@ class Lqr(Lab[LqrParams, LqrState]):
             return replace(state, trouble=regulator.trouble)
         push_left = PUSH_STEPS if "push" in inputs.actions else state.push_left
         force = _force(params, system, push_left, inputs.handles.get("pull"))
-        if state.since_update >= round(params.period / SIMULATION_STEP):
+        length = round(params.period / SIMULATION_STEP)
+        if state.since_update >= length:
             state = self._update_control(params, regulator, state)
-        x = system.step(state.x, state.u, force)
+        if isinstance(system, LinearSystem):
+            x = system.step(state.x, state.u, force)
+        elif state.since_update + 1 < length:
+            x = state.x
+        else:
+            x = system.advance(state.x, state.u, params.period, force)
         count = state.steps + 1
         if why := system.out_of_range(x):
             return replace(state, trouble=f"At t = {state.t:.2f} s {why}. {ADVICE}")
-        tip = system.mechanism.tip(x[: system.mechanism.nq])
         return replace(
             state,
             t=count * SIMULATION_STEP,
             steps=count,
             since_update=state.since_update + 1,
             x=x,
-            force=force(tip) if force else np.zeros(3),
+            force=_force_on_tip(system, x, force),
             push_left=max(push_left - 1, 0),
             account="" if force else state.account,
             path=np.vstack([state.path[-TRAIL + 1 :], system.phase_point(x)]),
@@ -220,10 +229,9 @@ class Lqr(Lab[LqrParams, LqrState]):
 
     def measure(self, params: LqrParams, state: LqrState) -> Measurement:
         regulator, system = params.regulator, params.linear_system
-        nq = system.mechanism.nq
+        nq = system.nq
         measured: dict[str, float | np.ndarray] = {
             "dq": (state.x - system.x_eq)[:nq],
-            "v": state.x[nq:],
             "u": state.u,
             "u_max": params.control_limit,
             "u_min": -params.control_limit,
@@ -231,6 +239,8 @@ class Lqr(Lab[LqrParams, LqrState]):
             "total": state.past_cost + state.cost_to_go,
             "predicted": state.predicted_cost,
         }
+        if nq < system.nx:
+            measured["v"] = state.x[nq:]
         if regulator.trouble:
             return measured
         if params.policy != "steady":
@@ -254,11 +264,17 @@ class Lqr(Lab[LqrParams, LqrState]):
             | comparison_fields(params.system, state.differences, state.seconds)
         )
 
+    def results(self, params: LqrParams, state: LqrState) -> Mapping[str, np.ndarray]:
+        return params.regulator.results()
+
     def labels(self, params: LqrParams) -> Mapping[str, str | tuple[str, ...]]:
         return plot_labels(params.linear_system)
 
     def draw(self, scene: Scene, params: LqrParams, state: LqrState) -> None:
         """The system, a ghost at its rest, and the forces on it."""
+        if isinstance(params.linear_system, OwnSystem):
+            draw_states(scene, params.linear_system, state.x)
+            return
         draw_regulated(scene, params, state.x, state.u, state.force)
 
 
@@ -273,15 +289,24 @@ def _summary(regulator: Regulator) -> str:
     return f"Studied. Recursion and SciPy differ by {regulator.mismatch:.0e} of P's size."
 
 
+def _force_on_tip(
+    system: LinearSystem | OwnSystem, x: np.ndarray, force: Force | None
+) -> np.ndarray:
+    """(3,) [N] to be seen."""
+    if force is None or isinstance(system, OwnSystem):
+        return np.zeros(3)
+    return force(system.mechanism.tip(x[: system.nq]))
+
+
 def _force(
     params: LqrParams,
-    system: LinearSystem,
+    system: LinearSystem | OwnSystem,
     push_left: int,
     handle: tuple[float, float, float] | None,
 ) -> Force | None:
     """On the tip: a push while it lasts, and a spring towards the handle while it is held."""
     push = np.array([0.0, params.push_force if push_left > 0 else 0.0, 0.0])
-    if handle is None:
+    if handle is None or isinstance(system, OwnSystem):
         return (lambda tip: push) if push.any() else None
     target, stiffness = np.array(handle), system.pull_stiffness
     return lambda tip: push + clip_norm(stiffness * (target - tip), 0.5 * stiffness)

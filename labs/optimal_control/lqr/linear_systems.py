@@ -61,6 +61,10 @@ class LinearSystem:
         return len(self.x_eq)
 
     @property
+    def nq(self) -> int:
+        return self.mechanism.nq
+
+    @property
     def nu(self) -> int:
         return len(self.u_eq)
 

@@ -1,8 +1,11 @@
 """The tunables of the regulator, its weights and its world."""
 
 import numpy as np
+from pydantic import field_validator
 
-from labs.optimal_control.lqr.linear_systems import LINEAR_SYSTEMS, LinearSystem, linear_system
+from labs.errors import LabError
+from labs.optimal_control.lqr.linear_systems import LINEAR_SYSTEMS, LinearSystem
+from labs.optimal_control.lqr.own_system import EXAMPLE, OwnSystem, own_system
 from labs.optimal_control.lqr.region_of_attraction import ClosedLoop
 from labs.optimal_control.lqr.regulator import (
     FINAL_WEIGHTS,
@@ -15,7 +18,10 @@ from labs.params import Group, Params
 
 SLIDING = {"system": ["cart-pole", "mass"]}
 TURNING = {"system": ["cart-pole", "pendulum", "ur5"]}
-OWN_LIMIT = {"system": ["cart-pole", "pendulum", "mass"]}
+OWN_LIMIT = {"system": ["cart-pole", "pendulum", "mass", "own"]}
+MECHANISM = {"system": list(LINEAR_SYSTEMS)}
+OWN = {"system": "own"}
+TIMES = {"discrete": "Steps: x(t+1) = A x + B u", "continuous": "Time: dx/dt = A x + B u"}
 PERIODS = {0.01: "10 ms", 0.02: "20 ms", 0.05: "50 ms", 0.1: "100 ms", 0.2: "200 ms"}
 
 SYSTEM = Group("System", effect="restart")
@@ -27,8 +33,15 @@ WORLD = Group("World", effect="solve")
 class LqrParams(Params):
     """What the user can turn."""
 
-    system: str = SYSTEM.choice("cart-pole", LINEAR_SYSTEMS, "System", key=True)
+    system: str = SYSTEM.choice(
+        "cart-pole", {**LINEAR_SYSTEMS, "own": "Your matrices"}, "System", key=True
+    )
     """What is to be kept at rest."""
+    matrices: str = SYSTEM.text(EXAMPLE, "Your matrices", rows=6, max_length=2000, when=OWN)
+    """A, B, Q, R and x0, each after its name, rows after one another with semicolons or on lines of
+    their own; or as JSON; pasted or a file. Up to 8 states and 4 controls."""
+    time: str = SYSTEM.choice("discrete", TIMES, "A and B are in", when=OWN)
+    """Continuous time is made discrete with the control held for a time step."""
     deviation: float = SYSTEM.knob(
         0.3,
         -3.2,
@@ -38,6 +51,7 @@ class LqrParams(Params):
         "Start off by",
         step=0.01,
         key=True,
+        when=MECHANISM,
         units={"system": {"mass": "m"}},
     )
     """Of the pole, the pendulum, the mass, or every joint of the UR5, at rest."""
@@ -75,6 +89,7 @@ class LqrParams(Params):
         "Control",
         scale="log",
         key=True,
+        when=MECHANISM,
         units={"system": {"cart-pole": "1/N²", "mass": "1/N²"}},
     )
     """R = r I: what force or torque costs."""
@@ -99,24 +114,35 @@ class LqrParams(Params):
         scale="log",
         key=True,
         when=OWN_LIMIT,
-        units={"system": {"cart-pole": "N", "mass": "N"}},
+        units={"system": {"cart-pole": "N", "mass": "N", "own": ""}},
     )
-    """Of the cart, the pendulum and the mass; the UR5's joints have motors of their own."""
+    """Of the cart, the pendulum, the mass, your controls; the UR5's joints have motors of their
+    own."""
     push_force: float = WORLD.knob(
         1.0, 0.0, 200.0, "f_{push}", "N", "Push force", scale="log", effect="live"
     )
-    """On the tip, along +y, while a push lasts, 0.2 s."""
+    """On the tip, along +y, while a push lasts, 0.2 s; to your controls it is added."""
+
+    @field_validator("matrices")
+    @classmethod
+    def _are_matrices(cls, value: str) -> str:
+        try:
+            own_system(value)
+        except LabError as error:
+            raise ValueError(str(error)) from None
+        return value
 
     @property
-    def linear_system(self) -> LinearSystem:
-        return linear_system(self.system)
+    def linear_system(self) -> LinearSystem | OwnSystem:
+        return self.settings.linear_system
 
     @property
     def settings(self) -> RegulatorSettings:
         weights = (self.q_slide, self.q_turn, self.q_slide_rate, self.q_turn_rate)
         return RegulatorSettings(
             self.system, self.period, weights, self.r, round(self.horizon), self.final,
-            self.alpha, self.policy,
+            self.alpha, self.policy, self.matrices if self.system == "own" else "",
+            self.time == "continuous",
         )  # fmt: skip
 
     @property
@@ -127,8 +153,9 @@ class LqrParams(Params):
     def control_limit(self) -> np.ndarray:
         """(nu,) [N; N m]: what the motors can give, limited or not."""
         system = self.linear_system
-        own = system.mechanism.control_limit
-        return own if self.system == "ur5" else np.full(system.nu, self.limit)
+        if isinstance(system, LinearSystem) and self.system == "ur5":
+            return system.mechanism.control_limit
+        return np.full(system.nu, self.limit)
 
     @property
     def closed_loop(self) -> ClosedLoop:

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from labs.optimal_control.lqr.linear_systems import LinearSystem
+from labs.optimal_control.lqr.own_system import OwnSystem
 from labs.optimal_control.lqr.params import LqrParams
 from labs.scene import Scene
 
@@ -17,6 +19,7 @@ def draw_regulated(
 ) -> None:
     """The system at x under the control u and a force on its tip, with a ghost at its rest."""
     system = params.linear_system
+    assert isinstance(system, LinearSystem)
     mechanism, arm = system.mechanism, system.mechanism.arm
     q, rest = x[: mechanism.nq], system.x_eq[: mechanism.nq]
     scene.camera(*system.camera)
@@ -32,6 +35,21 @@ def draw_regulated(
         push = _arrow(np.array([0.0, u[0], 0.0]))
         if np.abs(push).max() > 1e-3:
             scene.arrow("control", start, start + push, "actual")
+
+
+def draw_states(scene: Scene, system: OwnSystem, x: np.ndarray) -> None:
+    """A bead for each number of x on a rail of its own, a muted one at 0; half the rail is the
+    largest number of x0."""
+    scene.camera((2.2, 0.0, 1.0), (0.0, 0.0, 0.45))
+    scale = 0.5 / (float(np.abs(system.x0).max()) or 1.0)
+    heights = 0.8 - 0.7 * (np.arange(system.nx) + 0.5) / system.nx
+    for i, height in enumerate(heights):
+        place = float(np.clip(scale * x[i], -1.0, 1.0))
+        ends = np.array([[0.0, -1.0, height], [0.0, 1.0, height]])
+        scene.trail(f"rail {i + 1}", ends, "reference", 0.4)
+        scene.sphere(f"rest {i + 1}", (0.0, 0.0, height), 0.02, "muted")
+        scene.sphere(f"state {i + 1}", (0.0, place, height), 0.045)
+        scene.label(f"name {i + 1}", f"x{i + 1} = {x[i]:.3g}", (0.0, place, height + 0.07))
 
 
 def clip_norm(vector: np.ndarray, longest: float) -> np.ndarray:

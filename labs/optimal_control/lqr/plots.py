@@ -6,11 +6,13 @@ import numpy as np
 
 from labs.models.coordinates import coordinate_labels
 from labs.optimal_control.lqr.comparison import COMPARED_HORIZONS, HORIZON_COUNT
-from labs.optimal_control.lqr.linear_systems import LinearSystem
+from labs.optimal_control.lqr.linear_systems import LINEAR_SYSTEMS, LinearSystem
+from labs.optimal_control.lqr.own_system import OwnSystem
 from labs.optimal_control.lqr.region_of_attraction import HALF_WIDTHS, SYSTEM_CODES, grid_axes
 from labs.optimal_control.lqr.regulator import Regulator, last_settled
 from labs.plots import Curves, Line, Matrix, Plot, Readout, TimeSeries, Trace
 
+MECHANISM = {"system": tuple(LINEAR_SYSTEMS)}
 WITH_REGION = {"system": tuple(SYSTEM_CODES)}
 
 PLOTS: tuple[Plot, ...] = (
@@ -63,7 +65,7 @@ PLOTS: tuple[Plot, ...] = (
         guide="unit-circle",
         equal=True,
     ),
-    TimeSeries("Velocity", "{v_unit}", Line("v", r"\dot q"), select="joint"),
+    TimeSeries("Velocity", "{v_unit}", Line("v", r"\dot q"), select="joint", when=MECHANISM),
     Curves(
         "Time to solve",
         "N",
@@ -90,9 +92,11 @@ PLOTS: tuple[Plot, ...] = (
 )
 
 
-def plot_labels(system: LinearSystem) -> dict[str, str | tuple[str, ...]]:
+def plot_labels(system: LinearSystem | OwnSystem) -> dict[str, str | tuple[str, ...]]:
     """The coordinates of the system, and the one whose phase plane is shown: the last."""
-    named = coordinate_labels(system.mechanism)
+    named = (
+        own_labels(system) if isinstance(system, OwnSystem) else coordinate_labels(system.mechanism)
+    )
     unit, rate = named["q_unit"][-1], named["v_unit"][-1]
     return named | {
         "phase": f"{'place' if unit == 'm' else 'lean from the rest'} [{unit}]",
@@ -100,6 +104,19 @@ def plot_labels(system: LinearSystem) -> dict[str, str | tuple[str, ...]]:
         "phase_unit": unit,
         "gain_entry": "Kₜ,ᵢᵢ" if system.nu > 1 else "Kₜ,₁ᵢ",
     }
+
+
+def own_labels(system: OwnSystem) -> dict[str, tuple[str, ...]]:
+    """Of states and controls without units."""
+    joints, motors = (
+        tuple(f"{name}{k + 1}" for k in range(count))
+        for name, count in (("x", system.nx), ("u", system.nu))
+    )
+    none = ("",) * system.nx
+    return {
+        "joint": joints, "motor": motors, "q_unit": none, "v_unit": none,
+        "u_unit": ("",) * system.nu,
+    }  # fmt: skip
 
 
 def region_fields(system: str, region: np.ndarray, path: np.ndarray) -> dict[str, np.ndarray]:

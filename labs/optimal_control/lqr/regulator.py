@@ -17,6 +17,7 @@ import numpy as np
 from labs.algorithms.riccati import SteadyState, solve, steady_state, steady_state_directly
 from labs.errors import LabError
 from labs.optimal_control.lqr.linear_systems import LinearSystem, linear_system
+from labs.optimal_control.lqr.own_system import OwnSystem, own_system
 from labs.problems.linear_quadratic import LqrPolicy, LqrProblem
 
 MAX_RECURSIONS = 20_000
@@ -48,6 +49,15 @@ class RegulatorSettings:
     alpha: float
     policy: str
     """One of LQR_POLICIES."""
+    own: str = ""
+    """The matrices, where the system is "own"; Q and R are then among them, and ..."""
+    continuous: bool = False
+    """... A and B may be those of x' = A x + B u."""
+
+    @property
+    def linear_system(self) -> LinearSystem | OwnSystem:
+        """What is regulated."""
+        return own_system(self.own, self.continuous) if self.own else linear_system(self.system)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +74,8 @@ class Regulator:
     """Empty, or a sentence on why there is no such policy."""
 
     @property
-    def system(self) -> LinearSystem:
-        return linear_system(self.settings.system)
+    def system(self) -> LinearSystem | OwnSystem:
+        return self.settings.linear_system
 
     @cached_property
     def gains(self) -> np.ndarray:
@@ -131,6 +141,19 @@ class Regulator:
         p, k = p[:, p_end != 0.0], k[:, k_end != 0.0]
         return p / p_end[p_end != 0.0], k / k_end[k_end != 0.0]
 
+    def results(self) -> dict[str, np.ndarray]:
+        """A, B, Q, R and Q_f of the problem, the rest x_eq, u_eq it is about, and as far as there
+        is a policy: its gains K (M, nu, nx), its values P (M, nx, nx), and the eigenvalues of one
+        step without (`poles_open`) and with the first gain (`poles`)."""
+        p, system = self.problem, self.system
+        found = {"A": p.a, "B": p.b, "Q": p.q, "R": p.r, "Q_f": p.q_final}
+        found |= {"x_eq": system.x_eq, "u_eq": system.u_eq}
+        found["poles_open"] = np.linalg.eigvals(p.a).astype(complex)
+        if self.trouble:
+            return found
+        poles = np.linalg.eigvals(p.a + p.b @ self.gains[0]).astype(complex)
+        return found | {"K": self.gains, "P": self.values, "poles": poles}
+
     def cost(self, dx: np.ndarray, du: np.ndarray) -> float:
         """dx' Q dx + du' R du of one step."""
         return float(dx @ self.problem.q @ dx + du @ self.problem.r @ du)
@@ -142,16 +165,24 @@ def last_settled(shares: np.ndarray) -> int:
     return int(np.argmax(off)) - 1 if off.any() else len(shares) - 1
 
 
+def _weights(
+    settings: RegulatorSettings, system: LinearSystem | OwnSystem
+) -> tuple[np.ndarray, np.ndarray]:
+    """Q and R."""
+    if isinstance(system, OwnSystem):
+        return system.q, system.r
+    slide, turn, slide_rate, turn_rate = settings.weights
+    places = [slide if i in system.prismatic else turn for i in range(system.nq)]
+    rates = [slide_rate if i in system.prismatic else turn_rate for i in range(system.nq)]
+    return np.diag([*places, *rates]), settings.r * np.eye(system.nu)
+
+
 @lru_cache(maxsize=64)
 def regulator(settings: RegulatorSettings) -> Regulator:
     """The regulator of these settings; the same object every time."""
-    system = linear_system(settings.system)
+    system = settings.linear_system
     a, b = system.linear(settings.period)
-    nq = system.mechanism.nq
-    slide, turn, slide_rate, turn_rate = settings.weights
-    places = [slide if i in system.prismatic else turn for i in range(nq)]
-    rates = [slide_rate if i in system.prismatic else turn_rate for i in range(nq)]
-    q, r = np.diag([*places, *rates]), settings.r * np.eye(system.nu)
+    q, r = _weights(settings, system)
     steady, trouble = None, ""
     try:
         steady = steady_state(a, b, q, r, most=MAX_RECURSIONS)

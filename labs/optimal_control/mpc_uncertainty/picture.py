@@ -50,7 +50,7 @@ def draw_carts(scene: Scene, params: UncertaintyParams, first: np.ndarray) -> No
         near = params.wall + HALF_CART
         corners = [(near, FLOOR), (near + SLAB, FLOOR), (near + SLAB, TOP), (near, TOP)]
         scene.polygon(f"wall of {name}", np.array([(place, y, z) for y, z in corners]), "warning")
-        scene.label(f"name of {name}", name, (place, -1.68, 0.6))
+        scene.label(f"name of {name}", name, (place, -1.3, 0.6))
 
 
 def draw_limits(scene: Scene, plane: PhasePlane, params: UncertaintyParams) -> None:

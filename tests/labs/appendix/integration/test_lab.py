@@ -6,7 +6,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from labs.algorithms.runge_kutta import TABLEAUS, order, parse_tableau
+from labs.algorithms.butcher_tableau import parse_tableau
+from labs.algorithms.runge_kutta import TABLEAUS, order
 from labs.appendix.integration.convergence import exact_solution
 from labs.appendix.integration.params import (
     METHOD_NAMES,

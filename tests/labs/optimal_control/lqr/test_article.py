@@ -157,5 +157,21 @@ def test_one_answer_two_prices(setting: Mapping[str, Value]) -> None:
     assert EXPERIMENTS.answer("One answer, two prices") == "to about 4 digits"
 
 
+@EXPERIMENTS.verify("The cheapest way to stability")
+def test_the_cheapest_way_mirrors_eigenvalues(setting: Mapping[str, Value]) -> None:
+    params = lqr_params(setting)
+    p = params.regulator.problem
+    np.testing.assert_allclose(np.sort(np.linalg.eigvals(p.a)), [1.25, 2.0])
+    np.testing.assert_allclose(np.sort(closed_loop(params)), [0.5, 0.8], atol=1e-5)
+    assert params.regulator.growth == pytest.approx(0.8, abs=1e-5)
+    run = states(params, 4.0)
+    x = np.linalg.matrix_power(p.a + p.b @ params.regulator.gains[0], 20) @ [1.0, 1.0]
+    np.testing.assert_allclose(run[-1].x, x, rtol=1e-9)
+    # What is inside stays where it is.
+    text = str(setting["matrices"]).replace("1.25", "0.7")
+    inside = closed_loop(lqr_params(setting, matrices=text))
+    np.testing.assert_allclose(np.sort(inside), [0.5, 0.7], atol=1e-5)
+
+
 def test_every_experiment_of_the_article_is_verified() -> None:
     EXPERIMENTS.check_all_are_verified()

@@ -80,7 +80,7 @@ def test_the_hand_pulls_the_tip_towards_the_ball() -> None:
     params = LqrParams(system="mass", deviation=0.0)
     pulled = Inputs(handles={"pull": (0.0, 0.3, 0.6)})
     run = states(params, 3.0, dict.fromkeys(range(300), pulled))
-    stiffness = params.linear_system.pull_stiffness
+    stiffness = linear_system("mass").pull_stiffness
     assert run[1].force == pytest.approx([0.0, 0.3 * stiffness, 0.0], rel=0.01)
     dx = deviations(params, run)[-1]
     gain = params.regulator.gains[0][0]

@@ -1,0 +1,83 @@
+"""What is predicted in the lab of TD(lambda): the walk of 19 states and its value, and a grid world
+under a policy that takes the best control, but now and then any."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from labs.algorithms import policy_iteration
+from labs.algorithms.policy_evaluation import exact
+from labs.problems.finite_mdp import FiniteMDP, random_policy
+from labs.problems.prediction import PredictionTask, prediction_task, weighted_error
+from labs.tasks.grid_world.map import GridWorld, grid_world
+from labs.tasks.random_walk.walks import HORIZON, NINETEEN, walk_mdp
+
+GRID_HORIZON = 1000
+"""Steps after which an episode on a grid is cut."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where a policy is followed, and what it costs there."""
+
+    task: PredictionTask
+    world: GridWorld | None
+    """The grid world; None: the walk."""
+    steps: float
+    """Of an episode, on average, if none is cut."""
+
+    @property
+    def start(self) -> int:
+        """The state every episode begins in."""
+        return int(self.task.task.starts[0])
+
+    @property
+    def inside(self) -> np.ndarray:
+        """(X,) bool: the states that are not terminal."""
+        return ~self.task.task.terminal
+
+    @property
+    def untrained(self) -> float:
+        """The error of V = 0."""
+        return float(weighted_error(self.task, np.zeros(len(self.task.truth))))
+
+    @property
+    def scale(self) -> float:
+        """The largest cost-to-go, in magnitude; at least 1."""
+        return float(max(1.0, np.abs(self.task.truth).max()))
+
+
+@lru_cache(maxsize=8)
+def walk_place(gamma: float) -> Place:
+    """The even walk; the error counts all 19 states alike, as in the book."""
+    free = walk_mdp(NINETEEN)
+    mdp = FiniteMDP(free.C, gamma, free.terminal, successor=free.successor)
+    policy, start = random_policy(mdp), NINETEEN.start
+    task = prediction_task(mdp, policy, exact(mdp, policy), [start], HORIZON)
+    return Place(task, None, float(_visits(mdp, policy, start).sum()))
+
+
+@lru_cache(maxsize=16)
+def grid_place(text: str, wander: float, gamma: float) -> Place:
+    """From S to G; with probability `wander` a step takes any control. The error of a state counts
+    as often as an episode comes by: what is never seen cannot be learned."""
+    world = grid_world(text, False)
+    mdp = world.mdp(gamma)
+    _, best, _ = policy_iteration.optimum(world.mdp(1.0), np.zeros(mdp.X, np.int64))
+    policy = (1.0 - wander) * np.eye(mdp.U)[best] + wander / mdp.U
+    visits = _visits(mdp, policy, world.start)
+    task = prediction_task(
+        mdp, policy, exact(mdp, policy), [world.start], GRID_HORIZON, weight=visits
+    )
+    return Place(task, world, float(visits.sum()))
+
+
+def _visits(mdp: FiniteMDP, policy: np.ndarray, start: int) -> np.ndarray:
+    """(X,) eta: steps an episode begins in each state, on average: eta = h + P'eta, h the start."""
+    inside = ~mdp.terminal
+    P = mdp.transition_matrix(policy)[np.ix_(inside, inside)]
+    begun = (np.arange(mdp.X) == start)[inside].astype(float)
+    visits = np.zeros(mdp.X)
+    visits[inside] = np.linalg.solve(np.eye(len(P)) - P.T, begun)
+    return np.maximum(visits, 0.0)

@@ -1,0 +1,148 @@
+"""The worlds that were made to go wrong: the star, the pair, the spiral, and all nine learners."""
+
+import numpy as np
+
+from labs.reinforcement_learning.function_approximation import nine, spiral, triad
+from labs.reinforcement_learning.function_approximation.board_picture import draw_board
+from labs.reinforcement_learning.function_approximation.graph_picture import (
+    draw_spiral,
+    draw_states,
+    pair_places,
+    star_places,
+)
+from labs.reinforcement_learning.function_approximation.motion import Motion, hop
+from labs.reinforcement_learning.function_approximation.params import ApproximationParams
+from labs.reinforcement_learning.function_approximation.plots import (
+    COLUMNS,
+    OTHER_CELLS,
+    ROWS,
+    spread,
+)
+from labs.reinforcement_learning.function_approximation.subject import Fields, Training
+from labs.resumable import Resumable
+from labs.scene import Color, Scene
+
+STAR_NAMES = (*(f"2w{i} + w8" for i in "123456"), "w7 + 2w8")
+NEAR = 0.05
+"""A learner whose distance to the best q is below this has settled."""
+CHATTERS = 20
+"""Changes of the greedy policy, at least, of a learner that chatters."""
+
+
+class Triad:
+    """Baird's star, and the two states."""
+
+    def begin(self, params: ApproximationParams, rng: np.random.Generator) -> Training:
+        return triad.begin(params, rng)
+
+    def learn(self, params: ApproximationParams, training: Training) -> Resumable[Training]:
+        return triad.learn(params, training)
+
+    def measure(self, params: ApproximationParams, training: Training) -> dict[str, float]:
+        return {
+            "error_now": float(training["errors"].mean()),
+            "growth": float(np.linalg.eigvals(-triad.mean_matrix(params)).real.max()),
+            "largest": float(np.abs(training["w"]).max()),
+        }
+
+    def fields(self, params: ApproximationParams, training: Training) -> Fields:
+        values = np.linalg.eigvals(-triad.mean_matrix(params))
+        found = {"steps": training["steps"], "weights": training["path"]}
+        found |= {"real": values.real, "imaginary": values.imag}
+        return found | spread("error", training["error"])
+
+    def move(self, params: ApproximationParams, training: Training, motion: Motion) -> Motion:
+        return hop(triad.example(params).task, motion)
+
+    def draw(
+        self, scene: Scene, params: ApproximationParams, training: Training, motion: Motion
+    ) -> None:
+        values = triad.example(params).features.dense @ training["w"][params.shown]
+        star = params.world == "star"
+        names = STAR_NAMES if star else ("w", "2w")
+        if not params.approximate:
+            names = tuple(f"w{i + 1}" for i in range(len(names)))
+        places = star_places() if star else pair_places()
+        ways = tuple((x, 6) for x in range(6)) if star else ((0, 1),)
+        draw_states(scene, values[: len(names)], places, motion.place, names, ways)
+
+
+class Spiral:
+    """One weight on a spiral."""
+
+    def begin(self, params: ApproximationParams, rng: np.random.Generator) -> Training:
+        return spiral.begin(params, rng)
+
+    def learn(self, params: ApproximationParams, training: Training) -> Resumable[Training]:
+        return spiral.learn(params, training)
+
+    def measure(self, params: ApproximationParams, training: Training) -> dict[str, float]:
+        return {"error_now": float(training["error"][:, -1].mean())}
+
+    def fields(self, params: ApproximationParams, training: Training) -> Fields:
+        ways = training["path"]
+        around = np.linspace(ways.min() - 40.0, ways.max() + 4.0, 600)
+        curve_x, curve_y = spiral.in_plane(spiral.curve(around))
+        fine = np.interp(np.linspace(0, len(ways) - 1, 800), np.arange(len(ways)), ways)
+        way_x, way_y = spiral.in_plane(spiral.curve(fine))
+        found = {"steps": training["steps"], "curve_x": curve_x, "curve_y": curve_y}
+        found |= {"way_x": way_x, "way_y": way_y}
+        return found | spread("error", training["error"])
+
+    def move(self, params: ApproximationParams, training: Training, motion: Motion) -> Motion:
+        return motion
+
+    def draw(
+        self, scene: Scene, params: ApproximationParams, training: Training, motion: Motion
+    ) -> None:
+        draw_spiral(scene, training["path"])
+
+
+class Nine:
+    """The table of convergence."""
+
+    def begin(self, params: ApproximationParams, rng: np.random.Generator) -> Training:
+        return nine.begin(params, rng)
+
+    def learn(self, params: ApproximationParams, training: Training) -> Resumable[Training]:
+        return nine.learn(params, training)
+
+    def measure(self, params: ApproximationParams, training: Training) -> dict[str, float]:
+        return {}
+
+    def fields(self, params: ApproximationParams, training: Training) -> Fields:
+        found = {"rounds": training["steps"]}
+        for c, column in enumerate(COLUMNS):
+            found[f"distance_{column}"] = training["distance"][c::3].T
+        return found | {"changes": training["changes"][OTHER_CELLS].T}
+
+    def move(self, params: ApproximationParams, training: Training, motion: Motion) -> Motion:
+        return motion
+
+    def draw(
+        self, scene: Scene, params: ApproximationParams, training: Training, motion: Motion
+    ) -> None:
+        steps = training["steps"]
+        time = np.log(np.maximum(steps, 1.0)) / np.log(nine.EPISODES)
+        draw_board(scene, ROWS, COLUMNS, time, training["shown"], verdicts(training))
+
+
+def verdicts(training: Training) -> list[tuple[str, Color]]:
+    """How each of the nine fares, and a colour for it."""
+    if not training["steps"].size:
+        return [("", "actual")] * 9
+    found: list[tuple[str, Color]] = []
+    alive, late = nine.alive(training), training["distance"][:, -1]
+    for cell in range(9):
+        changes = int(training["changes"][cell, -1])
+        if not alive[cell]:
+            found.append(("left all bounds", "warning"))
+        elif cell == 2:
+            found.append((f"turns on: {changes}", "warning"))
+        elif late[cell] < NEAR:
+            found.append(("settled", "actual"))
+        elif changes >= CHATTERS:
+            found.append((f"chatters: {changes}", "reference"))
+        else:
+            found.append(("", "actual"))
+    return found

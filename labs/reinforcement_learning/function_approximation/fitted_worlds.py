@@ -1,0 +1,188 @@
+"""The worlds whose values are fitted with chosen features: the walk, the surface, the swing-up."""
+
+import numpy as np
+
+from labs.algorithms.features import Features
+from labs.reinforcement_learning.function_approximation import prediction, swing_up
+from labs.reinforcement_learning.function_approximation.given_policy import (
+    GAMMA,
+    PENDULUM,
+    grid_of,
+)
+from labs.reinforcement_learning.function_approximation.line_picture import draw_line
+from labs.reinforcement_learning.function_approximation.motion import (
+    Motion,
+    hop,
+    swing_by,
+    swing_until_caught,
+)
+from labs.reinforcement_learning.function_approximation.params import (
+    SHOWN_FEATURES,
+    ApproximationParams,
+)
+from labs.reinforcement_learning.function_approximation.plots import over_all, spread
+from labs.reinforcement_learning.function_approximation.prediction import given_policy
+from labs.reinforcement_learning.function_approximation.subject import Fields, Training
+from labs.reinforcement_learning.function_approximation.swing_up import (
+    HANGING,
+    features_of,
+    q_of,
+    swing_task,
+)
+from labs.resumable import Resumable
+from labs.scene import Scene
+from labs.tasks.pendulum_table.picture import draw_table, draw_wires
+from labs.tasks.pendulum_table.policy_arrows import torque_arrows
+
+
+class Predicted:
+    """The value of a given policy."""
+
+    def begin(self, params: ApproximationParams, rng: np.random.Generator) -> Training:
+        return prediction.begin(params, rng)
+
+    def learn(self, params: ApproximationParams, training: Training) -> Resumable[Training]:
+        return prediction.learn(params, training)
+
+    def measure(self, params: ApproximationParams, training: Training) -> dict[str, float]:
+        given = given_policy(params)
+        measured = {
+            "size": float(given.features.size),
+            "error_now": float(training["errors"].mean()),
+            "error_best": given.error(given.best),
+            "error_fixed": given.error(given.fixed),
+        }
+        if params.world == "surface":
+            measured["bound"] = given.error(given.best) / (1.0 - GAMMA)
+        if training["squares"].size:
+            measured["error_squares"] = float(training["squares"].mean())
+        return measured
+
+    def fields(self, params: ApproximationParams, training: Training) -> Fields:
+        given = given_policy(params)
+        found = {"steps": training["steps"]} | spread("error", training["error"])
+        best, fixed = given.error(given.best), given.error(given.fixed)
+        found |= over_all(training, reference_best=best, reference_fixed=fixed)
+        if training["squares"].size and len(training["steps"]) > 1:
+            found["squares_x"] = training["steps"][[0, -1]]
+            found["squares"] = np.full(2, training["squares"].mean())
+        v = given.values(training["w"][params.shown])
+        if params.world == "surface":
+            return found | _maps(params, given.features, v, given.task.truth)
+        inside = ~given.mdp.terminal
+        named = {"truth": given.task.truth, "estimate": v}
+        named |= {"best": given.values(given.best), "fixed": given.values(given.fixed)}
+        return (
+            found
+            | {name: values[inside] for name, values in named.items()}
+            | {"state": np.flatnonzero(inside).astype(float)}
+            | {"features": _some_features(given.features)[inside]}
+        )
+
+    def move(self, params: ApproximationParams, training: Training, motion: Motion) -> Motion:
+        given = given_policy(params)
+        if params.world == "walk":
+            return hop(given.task, motion)
+        starts = given.task.task.starts
+        return swing_until_caught(PENDULUM, given.mdp, given.policy, starts, motion)
+
+    def draw(
+        self, scene: Scene, params: ApproximationParams, training: Training, motion: Motion
+    ) -> None:
+        given = given_policy(params)
+        if params.world == "surface":
+            v = given.values(training["w"][params.shown])
+            _draw_relief(scene, params, given.features, v, given.task.truth, None, motion)
+            return
+        estimates = np.stack([given.values(w) for w in training["w"]])[:, 1:-1]
+        features = _some_features(given.features)[1:-1]
+        place = int(np.clip(motion.place - 1, 0, len(features) - 1))
+        draw_line(scene, given.task.truth[1:-1], estimates, params.shown, features, place)
+
+
+class SwingUp:
+    """The pendulum that learns to swing up."""
+
+    def begin(self, params: ApproximationParams, rng: np.random.Generator) -> Training:
+        return swing_up.begin(params, rng)
+
+    def learn(self, params: ApproximationParams, training: Training) -> Resumable[Training]:
+        return swing_up.learn(params, training)
+
+    def measure(self, params: ApproximationParams, training: Training) -> dict[str, float]:
+        measured = {
+            "size": float(training["w"][0].size),
+            "greedy_best": float(swing_task()[2][HANGING].min()),
+        }
+        if training["steps"].size:
+            measured["greedy_now"] = float(np.median(training["greedy"][:, -1]))
+        return measured
+
+    def fields(self, params: ApproximationParams, training: Training) -> Fields:
+        _, _, q_star = swing_task()
+        q = q_of(features_of(params), training["w"][params.shown])
+        found = {"steps": training["steps"]} | spread("greedy", training["greedy"], "median")
+        found |= over_all(training, optimum=float(q_star[HANGING].min()))
+        found |= _maps(params, features_of(params), q.min(axis=1), q_star.min(axis=1))
+        everywhere = np.ones(PENDULUM.X, bool)
+        return found | {"policy": torque_arrows(PENDULUM, q.argmin(axis=1), everywhere)}
+
+    def move(self, params: ApproximationParams, training: Training, motion: Motion) -> Motion:
+        def greedy() -> np.ndarray:
+            q = q_of(features_of(params), training["w"][params.shown])
+            return np.asarray(q.argmin(axis=1))
+
+        return swing_by(PENDULUM, swing_task()[0], greedy, motion)
+
+    def draw(
+        self, scene: Scene, params: ApproximationParams, training: Training, motion: Motion
+    ) -> None:
+        q = q_of(features_of(params), training["w"][params.shown])
+        truth, v = swing_task()[2].min(axis=1), q.min(axis=1)
+        policy = q.argmin(axis=1)
+        _draw_relief(scene, params, features_of(params), v, truth, policy, motion)
+
+
+def _some_features(features: Features) -> np.ndarray:
+    """(X, k) of them, few enough to be drawn."""
+    every = -(-features.size // SHOWN_FEATURES)
+    if features.size > 1000 // 2:
+        every = features.size // 8
+    return features.dense[:, ::every][:, :SHOWN_FEATURES]
+
+
+def _feature(params: ApproximationParams, features: Features) -> np.ndarray:
+    """(X,) the one to look at; the last where there are fewer."""
+    i = min(round(params.feature), features.size) - 1
+    return np.asarray(np.where(features.active == i, features.value, 0.0).sum(axis=1))
+
+
+def _maps(
+    params: ApproximationParams, features: Features, v: np.ndarray, truth: np.ndarray
+) -> Fields:
+    return {
+        "angle": PENDULUM.angles,
+        "velocity": PENDULUM.velocities,
+        "estimate_map": grid_of(v),
+        "truth_map": grid_of(truth),
+        "error_map": grid_of(v - truth),
+        "feature_map": grid_of(_feature(params, features)),
+    }
+
+
+def _draw_relief(
+    scene: Scene,
+    params: ApproximationParams,
+    features: Features,
+    v: np.ndarray,
+    truth: np.ndarray,
+    policy: np.ndarray | None,
+    motion: Motion,
+) -> None:
+    high = float(truth.max())
+    phi = _feature(params, features)
+    relief = {"estimate": v, "truth": truth, "feature": high * phi / max(np.abs(phi).max(), 1e-9)}
+    shown = relief[params.look]
+    draw_table(scene, PENDULUM, shown, high, policy, motion.swing)
+    if params.look == "estimate":
+        draw_wires(scene, PENDULUM, truth, high)

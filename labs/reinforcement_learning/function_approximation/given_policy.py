@@ -1,0 +1,123 @@
+"""What is predicted: the random walk of 1000 states, and the pendulum that swings up by its optimal
+table, each with its truth and with what the features can make of it.
+
+The pendulum's episodes begin anywhere and end once it is caught, upright and slow; from there on
+nothing is paid. All of it is deterministic but the start."""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from labs.algorithms import policy_iteration
+from labs.algorithms.approximation import best_fit, mean_update, td_fixed_point
+from labs.algorithms.features import Features, vanishing
+from labs.problems.finite_mdp import FiniteMDP, random_policy
+from labs.problems.prediction import PredictionTask, prediction_task
+from labs.reinforcement_learning.function_approximation.feature_sets import (
+    line_features,
+    plane_features,
+)
+from labs.tasks.pendulum_table.table import PendulumGrid, pendulum_grid
+from labs.tasks.random_walk.walks import THOUSAND, visit_share, walk_mdp, walk_task
+
+PENDULUM = pendulum_grid(rods=1, q_nodes=41, v_nodes=31, levels=5)
+"""1271 states, 5 torques, 0.1 s a step."""
+GAMMA = 0.95
+"""Of the pendulum's costs."""
+HORIZON = 200
+"""Steps: beyond what the pendulum takes from any start."""
+CAUGHT = (0.2, 0.6)
+"""[rad], [rad/s] from upright at rest within which it is caught."""
+
+
+@dataclass(frozen=True, eq=False)
+class GivenPolicy:
+    """A policy to be judged, and the features it is judged with."""
+
+    task: PredictionTask
+    features: Features
+    mdp: FiniteMDP
+    policy: np.ndarray
+    best: np.ndarray
+    """w (d,) of the least value error, weighed by the visits of the policy."""
+    fixed: np.ndarray
+    """w (d,) of the TD fixed point."""
+
+    def error(self, w: np.ndarray) -> float:
+        """sqrt of the value error of w (d,)."""
+        v = (self.features.value * w[self.features.active]).sum(axis=1)
+        return float(np.sqrt(self.task.weight @ (v - self.task.truth) ** 2))
+
+    def values(self, w: np.ndarray) -> np.ndarray:
+        """v (X,)."""
+        return np.asarray((self.features.value * w[self.features.active]).sum(axis=1))
+
+
+@lru_cache(maxsize=8)
+def walk(kind: str, n: int) -> GivenPolicy:
+    """The even policy on the 1000 states."""
+    task = walk_task(THOUSAND)._replace(weight=visit_share(THOUSAND))
+    mdp = walk_mdp(THOUSAND)
+    features = line_features(kind, n, THOUSAND.states)
+    return _solved(task, features, mdp, random_policy(mdp), kind)
+
+
+@lru_cache(maxsize=8)
+def surface(kind: str, m: int) -> GivenPolicy:
+    """The optimal policy of the pendulum."""
+    task, mdp, policy = caught_pendulum()
+    features = vanishing(plane_features(kind, m, PENDULUM), mdp.terminal)
+    return _solved(task, features, mdp, policy, kind)
+
+
+@lru_cache(maxsize=1)
+def caught_pendulum() -> tuple[PredictionTask, FiniteMDP, np.ndarray]:
+    """The task, its model, and the policy (X,) int64."""
+    grid, free = PENDULUM, PENDULUM.mdp(GAMMA)
+    away = np.abs(grid.nodes - np.array([np.pi, 0.0]))
+    ended = (away < np.array(CAUGHT)).all(axis=1)
+    cost = np.where(ended[:, None], 0.0, free.C)
+    stays = np.where(ended[:, None], np.arange(grid.X)[:, None], free.successors)
+    mdp = FiniteMDP(cost, GAMMA, ended, successor=stays.astype(np.int32))
+    value, policy, _ = policy_iteration.optimum(mdp, np.zeros(grid.X, np.int64))
+    policy = np.asarray(policy, np.int64)
+    starts, visits = _visits(mdp, policy)
+    return prediction_task(mdp, policy, value, starts, HORIZON, weight=visits), mdp, policy
+
+
+def _visits(mdp: FiniteMDP, policy: np.ndarray) -> tuple[list[int], np.ndarray]:
+    """The states from which the goal is reached, and how often each (X,) is met from all of them.
+    A few nodes beside the goal round to one another for ever."""
+    ahead = mdp.successors[np.arange(mdp.X), policy]
+    last = np.arange(mdp.X)
+    for _ in range(HORIZON):
+        last = ahead[last]
+    starts = np.flatnonzero(mdp.terminal[last] & ~mdp.terminal)
+    visits, at = np.zeros(mdp.X), starts
+    while len(at):
+        visits += np.bincount(at, minlength=mdp.X)
+        at = ahead[at]
+        at = at[~mdp.terminal[at]]
+    return starts.tolist(), visits
+
+
+def _solved(
+    task: PredictionTask, features: Features, mdp: FiniteMDP, policy: np.ndarray, kind: str
+) -> GivenPolicy:
+    mu = task.weight
+    if kind == "table":
+        # Both are the truth; the linear systems are large.
+        best = np.zeros(features.size)
+        live = features.value[:, 0] != 0.0
+        best[features.active[live, 0]] = task.truth[live]
+        return GivenPolicy(task, features, mdp, policy, best, best)
+    P, C, phi = mdp.transition_matrix(policy), mdp.policy_cost(policy), features.dense
+    best = best_fit(task.truth, phi, mu)
+    fixed = td_fixed_point(*mean_update(P, C, float(mdp.gamma), phi, mu))
+    return GivenPolicy(task, features, mdp, policy, best, fixed)
+
+
+def grid_of(values: np.ndarray, grid: PendulumGrid = PENDULUM) -> np.ndarray:
+    """Values (X,) as a map (velocities, angles)."""
+    return values.reshape(grid.shape).T

@@ -1,0 +1,172 @@
+"""What function approximation plots, in each of its worlds, and the curves behind it."""
+
+import numpy as np
+
+from labs.plots import Curves, HeatMap, Plot, Readout, Trace, When
+from labs.reinforcement_learning.function_approximation.subject import Fields, Training
+
+WALK: When = {"world": ("walk",)}
+GIVEN: When = {"world": ("walk", "surface")}
+PLANE: When = {"world": ("surface", "swing")}
+SWING: When = {"world": ("swing",)}
+FITTED: When = {"world": ("walk", "surface", "swing")}
+EXAMPLES: When = {"world": ("star", "pair", "spiral")}
+TRIAD: When = {"world": ("star", "pair")}
+SPIRAL: When = {"world": ("spiral",)}
+NINE: When = {"world": ("nine",)}
+ROWS = ("MC control", "SARSA", "Q-learning")
+COLUMNS = ("table", "linear", "nonlinear")
+AXES = ("angle from upright [rad]", "velocity [rad/s]")
+OTHERS = ("MC, table", "MC, linear", "SARSA, linear", "MC, nonlinear")
+"""Learners whose changes of policy are plotted, and their cells in `nine`."""
+OTHER_CELLS = [0, 1, 4, 2]
+
+
+def _map(title: str, z: str, z_label: str, when: When = PLANE, arrows: str = "") -> HeatMap:
+    return HeatMap(title, "angle", "velocity", z, *AXES, z_label, when=when, arrows=arrows)
+
+
+PLOTS: tuple[Plot, ...] = (
+    Curves(
+        "Value along the line",
+        "state",
+        "v",
+        Trace("state", "truth", "truth", "dash"),
+        Trace("state", "estimate", "estimate", series=1),
+        Trace("state", "best", "best fit", series=3),
+        Trace("state", "fixed", "TD fixed point", series=2),
+        when=WALK,
+    ),
+    Curves(
+        "Value error",
+        "{unit}",
+        "root mean square",
+        Trace("steps", "error", "mean of six", series=1),
+        Trace("steps", "error_low", "", "dash", series=1),
+        Trace("steps", "error_high", "", "dash", series=1),
+        Trace("reference_x", "reference_best", "best fit", "dash", series=3),
+        Trace("reference_x", "reference_fixed", "TD fixed point", "dash", series=2),
+        Trace("squares_x", "squares", "least squares of the batch", "dash"),
+        log_y=True,
+        when=GIVEN,
+    ),
+    Curves(
+        "Error of all values",
+        "updates",
+        "root mean square",
+        Trace("steps", "error", "mean of six", series=1),
+        Trace("steps", "error_low", "", "dash", series=1),
+        Trace("steps", "error_high", "", "dash", series=1),
+        log_y=True,
+        when=EXAMPLES,
+    ),
+    Curves("Features", "state", "φ", Trace("state", "features", "φ{}", series=1), when=WALK),
+    _map("Estimate", "estimate_map", "v"),
+    _map("Truth", "truth_map", "V"),
+    _map("Error map", "error_map", "v − V"),
+    _map("Feature", "feature_map", "φ"),
+    Curves(
+        "Cost of the greedy policy",
+        "{unit}",
+        "J from hanging",
+        Trace("steps", "greedy", "median of six", series=1),
+        Trace("steps", "greedy_low", "", "dash", series=1),
+        Trace("steps", "greedy_high", "", "dash", series=1),
+        Trace("reference_x", "optimum", "optimal", "dash"),
+        log_y=True,
+        when=SWING,
+    ),
+    _map("Greedy policy", "estimate_map", "min q", SWING, "policy"),
+    Curves(
+        "Weights",
+        "updates",
+        "w",
+        Trace("steps", "weights", "w{}", series=1),
+        when=TRIAD,
+    ),
+    Curves(
+        "Eigenvalues of −A",
+        "real",
+        "imaginary",
+        Trace("real", "imaginary", "", "points", series=1),
+        guide="imaginary-axis",
+        when=TRIAD,
+    ),
+    Curves(
+        "The spiral",
+        "one way",
+        "across",
+        Trace("curve_x", "curve_y", "values within reach"),
+        Trace("way_x", "way_y", "values of the learner", series=1),
+        equal=True,
+        when=SPIRAL,
+    ),
+    *(
+        Curves(
+            f"Distance to the best q, {column}",
+            "episodes",
+            "root mean square",
+            Trace("rounds", f"distance_{column}", ROWS, series=1),
+            log_x=True,
+            log_y=True,
+            when=NINE,
+        )
+        for column in COLUMNS
+    ),
+    Curves(
+        "Changes of the greedy policy",
+        "episodes",
+        "so far",
+        Trace("rounds", "changes", OTHERS, series=1),
+        log_x=True,
+        when=NINE,
+    ),
+    Readout("learned", "Learned from", "{unit}", whole=True),
+    Readout("size", "Weights", "", whole=True, when=FITTED),
+    Readout(
+        "error_now",
+        "Value error",
+        "",
+        when={"world": ("walk", "surface", "star", "pair", "spiral")},
+    ),
+    Readout("error_best", "Of the best fit", "", when=GIVEN),
+    Readout("error_fixed", "Of the TD fixed point", "", when=GIVEN),
+    Readout("error_squares", "Of least squares", "", when=GIVEN),
+    Readout("bound", "Bound on TD's", "", when={"world": ("surface",)}),
+    Readout("greedy_now", "Greedy cost, median", "", when=SWING),
+    Readout("greedy_best", "Optimal cost", "", when=SWING),
+    Readout("growth", "Largest real part of −A", "", when=TRIAD),
+    Readout("largest", "Largest weight", "", when=TRIAD),
+)
+
+
+def completed(found: Fields) -> Fields:
+    """With zeros for the plots that only other worlds have."""
+    for plot in PLOTS:
+        if isinstance(plot, HeatMap) and plot.z not in found:
+            axes = {plot.x: np.zeros(1), plot.y: np.zeros(1)} | found
+            found = axes | {plot.z: np.zeros((len(axes[plot.y]), len(axes[plot.x])))}
+        if isinstance(plot, HeatMap) and plot.arrows:
+            found = {plot.arrows: np.zeros((0, 4))} | found
+        if isinstance(plot, Curves):
+            for trace in plot.traces:
+                x = found.get(trace.x, np.zeros(0))
+                names = trace.label if isinstance(trace.label, tuple) else ()
+                y = np.zeros((len(x), len(names))) if names else np.zeros(len(x))
+                found = {trace.x: x, trace.y: y} | found
+    return found
+
+
+def spread(name: str, curves: np.ndarray, middle: str = "mean") -> Fields:
+    """The middle of S curves (S, k), the least and the largest."""
+    center = np.median(curves, axis=0) if middle == "median" else curves.mean(axis=0)
+    return {name: center, f"{name}_low": curves.min(axis=0), f"{name}_high": curves.max(axis=0)}
+
+
+def over_all(training: Training, **levels: float) -> Fields:
+    """Horizontal lines at some levels, from the first to the last of the steps."""
+    steps = training["steps"]
+    if not len(steps):
+        return {}
+    lines = {name: np.full(2, level) for name, level in levels.items()}
+    return {"reference_x": steps[[0, -1]]} | lines

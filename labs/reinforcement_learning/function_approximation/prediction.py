@@ -1,0 +1,158 @@
+"""Learning the value of a given policy: on the line of the random walk and on the pendulum's plane.
+
+A training has, besides what every one has, of S learners with d weights each:
+
+    w, h (S, d)  count (S, 1)  random (S, 4)  errors, alive (S,)    labs/algorithms/approximation.py
+    luck (S, 4)      the generators at the beginning: a fixed batch is drawn from them
+    error (S, k)     sqrt of the value error after each iteration
+    squares (S,)     that of least squares on the batch, where there is one
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from labs.algorithms import approximation
+from labs.algorithms.approximation import (
+    GRADIENT_MC,
+    ORACLE,
+    SEMI_GRADIENT_LAMBDA,
+    SEMI_GRADIENT_TD,
+)
+from labs.algorithms.batch_approximation import (
+    REPLAY_MC,
+    REPLAY_TD,
+    Transitions,
+    collect_transitions,
+    least_squares_fit,
+    lstd,
+    replay,
+)
+from labs.problems.episodes import UpdateRule
+from labs.reinforcement_learning.function_approximation.given_policy import (
+    GivenPolicy,
+    caught_pendulum,
+    surface,
+    walk,
+)
+from labs.reinforcement_learning.function_approximation.params import (
+    ITERATIONS,
+    LEARNERS,
+    ApproximationParams,
+)
+from labs.reinforcement_learning.function_approximation.predictors import (
+    arrays_of,
+    predictors_of,
+)
+from labs.reinforcement_learning.function_approximation.subject import Training
+from labs.resumable import Resumable
+from labs.tasks.random_walk.walks import THOUSAND, walk_task
+
+METHODS = {
+    "oracle": ORACLE,
+    "mc": GRADIENT_MC,
+    "td": SEMI_GRADIENT_TD,
+    "td-lambda": SEMI_GRADIENT_LAMBDA,
+}
+LIMIT = 1e3
+"""No weight that converges gets as large."""
+
+
+def given_policy(params: ApproximationParams) -> GivenPolicy:
+    """What is judged."""
+    if params.world == "walk":
+        return walk(params.features, round(params.n))
+    return surface(params.features, round(params.m))
+
+
+def begin(params: ApproximationParams, rng: np.random.Generator) -> Training:
+    """All weights 0."""
+    given = given_policy(params)
+    size = given.features.size
+    first = approximation.init(given.task, given.features, np.zeros(size), LEARNERS, rng)
+    return {
+        "luck": first.random,
+        "error": np.zeros((LEARNERS, 0)),
+        "squares": np.zeros(0),
+        "steps": np.zeros(0),
+        "sound": np.array(True),
+    } | arrays_of(first)
+
+
+def learn(params: ApproximationParams, training: Training) -> Resumable[Training]:
+    """The next hundredth of the episodes, or of the draws from a batch."""
+    given, rule = given_policy(params), _rule(params)
+    if params.data == "latest":
+        part, method = max(1, round(params.episodes / ITERATIONS)), METHODS[params.target]
+        learners = approximation.step(
+            given.task, given.features, rule, method, predictors_of(training), part
+        )
+        return _recorded(training, arrays_of(learners), part)
+    episodes = round(params.batch)
+    batches = [batch_of(params.world, luck.tobytes(), episodes) for luck in training["luck"]]
+    if not training["squares"].size:
+        fitted = []
+        for batch in batches:
+            fitted.append(_least_squares(given, batch, _bootstraps(params)))
+            yield
+        training = {**training, "squares": np.array([given.error(w) for w in fitted])}
+        if params.data == "batch":
+            return _recorded(training, {"w": np.stack(fitted), "errors": training["squares"]}, 1)
+    return _recorded(training, _replayed(params, given, rule, training, batches), 1)
+
+
+def _replayed(
+    params: ApproximationParams,
+    given: GivenPolicy,
+    rule: UpdateRule,
+    training: Training,
+    batches: list[Transitions],
+) -> dict[str, np.ndarray]:
+    """After as many draws as make a hundredth of the uses of all samples."""
+    w, random, count = (training[name].copy() for name in ("w", "random", "count"))
+    method = REPLAY_TD if _bootstraps(params) else REPLAY_MC
+    for s, batch in enumerate(batches):
+        draws = max(1, round(params.passes * len(batch.x) / ITERATIONS))
+        gamma, done = float(given.mdp.gamma), int(count[s, 0])
+        w[s] = replay(given.features, batch, gamma, rule, method, w[s], random[s], draws, done)
+        count[s] += draws
+    alive = np.abs(w).max(axis=1) <= LIMIT
+    w = np.where(alive[:, None], w, training["w"])
+    errors = np.array([given.error(weights) for weights in w])
+    return {"w": w, "random": random, "count": count, "errors": errors, "alive": alive}
+
+
+@lru_cache(maxsize=2 * LEARNERS)
+def batch_of(world: str, luck: bytes, episodes: int) -> Transitions:
+    """What so many episodes hold, drawn by the generator `luck`."""
+    task = walk_task(THOUSAND) if world == "walk" else caught_pendulum()[0]
+    return collect_transitions(task, np.frombuffer(luck, np.uint64).copy(), episodes)
+
+
+def _least_squares(given: GivenPolicy, batch: Transitions, bootstraps: bool) -> np.ndarray:
+    if bootstraps:
+        return lstd(given.features, batch, float(given.mdp.gamma))
+    return least_squares_fit(given.features, batch)
+
+
+def _bootstraps(params: ApproximationParams) -> bool:
+    return params.target in ("td", "td-lambda")
+
+
+def _rule(params: ApproximationParams) -> UpdateRule:
+    return UpdateRule(params.alpha, params.omega, trace_decay=params.decay, limit=LIMIT)
+
+
+def _recorded(training: Training, after: dict[str, np.ndarray], part: int) -> Training:
+    """With another point of each curve."""
+    together = {**training, **after}
+    last = training["error"][:, -1] if training["steps"].size else training["errors"]
+    errors = np.where(np.isfinite(together["errors"]), together["errors"], last)
+    done = float(training["steps"][-1]) if training["steps"].size else 0.0
+    return {
+        **together,
+        "errors": errors,
+        "steps": np.append(training["steps"], done + part),
+        "error": np.column_stack([training["error"], errors]),
+        "sound": np.array(bool(together["alive"].all())),
+    }

@@ -1,0 +1,28 @@
+"""Learners of a value (labs/algorithms/approximation.py) as the plain arrays of a training."""
+
+from labs.algorithms.approximation import LinearPredictors
+from labs.reinforcement_learning.function_approximation.subject import Fields, Training
+
+
+def arrays_of(learners: LinearPredictors) -> Fields:
+    """What a training keeps of them."""
+    return {
+        "w": learners.w,
+        "h": learners.h,
+        "count": learners.count,
+        "random": learners.random,
+        "errors": learners.errors,
+        "alive": learners.sound,
+    }
+
+
+def predictors_of(training: Training) -> LinearPredictors:
+    """The learners of a training."""
+    return LinearPredictors(
+        w=training["w"],
+        h=training["h"],
+        count=training["count"],
+        random=training["random"],
+        errors=training["errors"],
+        sound=training["alive"],
+    )

@@ -1,0 +1,48 @@
+"""What the lab's worlds have in common: each is a subject that learners learn.
+
+A training is a mapping of arrays, complete: it holds all that goes on from there. Every one has
+
+    steps (k,)         what has been learned from after each iteration: episodes, or updates
+    sound ()           whether all weights stayed within bounds
+"""
+
+from collections.abc import Mapping
+from typing import Protocol
+
+import numpy as np
+
+from labs.reinforcement_learning.function_approximation.motion import Motion
+from labs.reinforcement_learning.function_approximation.params import ApproximationParams
+from labs.resumable import Resumable
+from labs.scene import Scene
+
+Training = Mapping[str, np.ndarray]
+Fields = dict[str, np.ndarray]
+
+
+class Subject(Protocol):
+    """One world."""
+
+    def begin(self, params: ApproximationParams, rng: np.random.Generator) -> Training:
+        """Nothing learned yet."""
+        ...
+
+    def learn(self, params: ApproximationParams, training: Training) -> Resumable[Training]:
+        """The training after one of ITERATIONS."""
+        ...
+
+    def move(self, params: ApproximationParams, training: Training, motion: Motion) -> Motion:
+        """One PERIOD later."""
+        ...
+
+    def measure(self, params: ApproximationParams, training: Training) -> dict[str, float]:
+        """Numbers of the tiles."""
+        ...
+
+    def fields(self, params: ApproximationParams, training: Training) -> Fields:
+        """Arrays of this world's plots."""
+        ...
+
+    def draw(
+        self, scene: Scene, params: ApproximationParams, training: Training, motion: Motion
+    ) -> None: ...

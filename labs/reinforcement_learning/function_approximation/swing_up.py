@@ -1,0 +1,160 @@
+"""Learning to swing up a pendulum: q(x, u, w) = phi(x)' w_u over its plane, five torques.
+
+A training has, besides what every one has, of S learners with d weights for each control:
+
+    w (S, U, d)  visits (S, X, U)  random (S, 4)  alive (S,)    labs/algorithms/linear_control.py
+    luck (S, 4)      the generators at the beginning: a fixed batch is drawn from them
+    drawn (S,)       updates from the batch
+    greedy (S, k)    cost of the greedy policy from hanging at rest, after each iteration
+    error (S, k)     root mean square of min_u q - V*
+
+The batch holds short episodes from anywhere under torques drawn at random."""
+
+from functools import lru_cache
+
+import numpy as np
+
+from labs.algorithms import linear_control, policy_iteration
+from labs.algorithms.batch_approximation import (
+    Transitions,
+    collect_transitions,
+    replay_q_learning,
+)
+from labs.algorithms.bellman import q_values
+from labs.algorithms.exploration import BehaviourPolicy
+from labs.algorithms.features import Features
+from labs.algorithms.linear_control import LinearControllers
+from labs.algorithms.policy_evaluation import exact
+from labs.problems.episodes import EpisodicTask, UpdateRule, episodic_task
+from labs.problems.finite_mdp import FiniteMDP, random_policy
+from labs.problems.prediction import prediction_task
+from labs.reinforcement_learning.function_approximation.feature_sets import plane_features
+from labs.reinforcement_learning.function_approximation.given_policy import GAMMA, PENDULUM
+from labs.reinforcement_learning.function_approximation.params import (
+    CONTROLLERS,
+    ITERATIONS,
+    LEARNERS,
+    ApproximationParams,
+)
+from labs.reinforcement_learning.function_approximation.subject import Training
+from labs.resumable import Resumable
+
+HORIZON, SHORT = 100, 20
+"""Steps of an episode, and of one of the batch."""
+LIMIT = 1e4
+"""An error beyond this diverges: all costs to come are below 24."""
+HANGING = int(PENDULUM.state(np.zeros(1), np.zeros(1)))
+
+
+@lru_cache(maxsize=1)
+def swing_task() -> tuple[FiniteMDP, EpisodicTask, np.ndarray]:
+    """The model, its episodes from hanging at rest, and Q* (X, U)."""
+    mdp = PENDULUM.mdp(GAMMA)
+    value, _, _ = policy_iteration.optimum(mdp, np.zeros(mdp.X, np.int64))
+    return mdp, episodic_task(mdp, [HANGING], HORIZON), q_values(mdp, value)
+
+
+def features_of(params: ApproximationParams) -> Features:
+    """Of the plane's nodes."""
+    return plane_features(params.features, round(params.m), PENDULUM)
+
+
+def q_of(features: Features, w: np.ndarray) -> np.ndarray:
+    """(X, U) of weights (U, d)."""
+    return np.asarray((features.value[:, None] * w.T[features.active].transpose(0, 2, 1)).sum(2))
+
+
+def begin(params: ApproximationParams, rng: np.random.Generator) -> Training:
+    """All weights 0."""
+    first = linear_control.init(swing_task()[1], features_of(params), LEARNERS, rng)
+    none = np.zeros((LEARNERS, 0))
+    return {
+        "luck": first.random,
+        "drawn": np.zeros(LEARNERS, np.int64),
+        "greedy": none,
+        "error": none,
+        "steps": np.zeros(0),
+        "sound": np.array(True),
+    } | _arrays(first)
+
+
+def learn(params: ApproximationParams, training: Training) -> Resumable[Training]:
+    """The next hundredth of the episodes, or of the draws from a batch."""
+    features, rule = features_of(params), UpdateRule(params.alpha, params.omega, limit=LIMIT)
+    if params.data == "latest":
+        part = max(1, round(params.episodes / ITERATIONS))
+        after = yield from _by_episodes(params, features, rule, training, part)
+    else:
+        part = 1
+        after = yield from _from_batches(params, features, rule, training)
+    return _recorded(features, {**training, **after}, part)
+
+
+def _by_episodes(
+    params: ApproximationParams,
+    features: Features,
+    rule: UpdateRule,
+    training: Training,
+    part: int,
+) -> Resumable[dict[str, np.ndarray]]:
+    method = list(CONTROLLERS).index(params.controller)
+    behaviour, (_, task, _) = BehaviourPolicy(epsilon=params.epsilon), swing_task()
+    none, pieces = np.zeros((1, 0)), []
+    for s in range(LEARNERS):
+        w, visits, random, alive = (
+            training[name][s : s + 1] for name in ("w", "visits", "random", "alive")
+        )
+        alone = LinearControllers(w, visits, random, none, none.astype(np.int64), alive)
+        pieces.append(
+            _arrays(linear_control.step(task, features, behaviour, rule, method, alone, part))
+        )
+        yield
+    return {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
+
+
+def _from_batches(
+    params: ApproximationParams, features: Features, rule: UpdateRule, training: Training
+) -> Resumable[dict[str, np.ndarray]]:
+    w, random, drawn = (training[name].copy() for name in ("w", "random", "drawn"))
+    for s, luck in enumerate(training["luck"]):
+        batch = batch_of(luck.tobytes(), round(params.batch))
+        draws = max(1, round(params.passes * len(batch.x) / ITERATIONS))
+        done = int(drawn[s])
+        w[s] = replay_q_learning(features, batch, GAMMA, rule, w[s], random[s], draws, done)
+        drawn[s] += draws
+        yield
+    alive = np.abs(w).max(axis=(1, 2)) <= LIMIT
+    w = np.where(alive[:, None, None], w, training["w"])
+    return {"w": w, "random": random, "drawn": drawn, "alive": alive}
+
+
+@lru_cache(maxsize=2 * LEARNERS)
+def batch_of(luck: bytes, episodes: int) -> Transitions:
+    """Short episodes from anywhere, torques drawn evenly by the generator `luck`."""
+    mdp = swing_task()[0]
+    unknown = np.zeros(mdp.X)  # nobody asks what the random policy is worth
+    task = prediction_task(mdp, random_policy(mdp), unknown, range(mdp.X), SHORT)
+    return collect_transitions(task, np.frombuffer(luck, np.uint64).copy(), episodes)
+
+
+def _arrays(learners: LinearControllers) -> dict[str, np.ndarray]:
+    names = ("w", "visits", "random")
+    return {name: getattr(learners, name) for name in names} | {"alive": learners.sound}
+
+
+def _recorded(features: Features, training: Training, part: int) -> Training:
+    """With another point of each curve."""
+    mdp, _, q_star = swing_task()
+    greedy, error = [], []
+    for w in training["w"]:
+        q = q_of(features, w)
+        greedy.append(float(exact(mdp, q.argmin(axis=1))[HANGING]))
+        error.append(float(np.sqrt(np.mean((q.min(axis=1) - q_star.min(axis=1)) ** 2))))
+    done = float(training["steps"][-1]) if training["steps"].size else 0.0
+    return {
+        **training,
+        "steps": np.append(training["steps"], done + part),
+        "greedy": np.column_stack([training["greedy"], greedy]),
+        "error": np.column_stack([training["error"], error]),
+        "sound": np.array(bool(training["alive"].all())),
+    }

@@ -4,11 +4,14 @@ A lab calls what it needs once in `Lab.prepare`, before anybody waits for it."""
 
 import contextlib
 import hashlib
-from collections.abc import Callable
+import os
+import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numba
+from numba.core import config, event
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -33,27 +36,82 @@ def _compiled(function: F, inline: bool) -> F:
     return cast(F, machine_code(function))
 
 
+def source_digest(package: Path) -> str:
+    """Of all sources of a package with compiled functions."""
+    digest = hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        text = path.read_bytes()
+        if b"compiled" in text:
+            digest.update(str(path.relative_to(package)).encode() + b"\0" + text)
+    return digest.hexdigest()
+
+
 def forget_stale(package: Path) -> bool:
     """Deletes what was compiled in a package if a source with compiled functions has changed since;
     whether it did. Numba sees that a function's own file changed, but not the file of a function
     it calls."""
-    sources = [(path, path.read_bytes()) for path in sorted(package.rglob("*.py"))]
-    digest = hashlib.sha256()
-    for path, text in sources:
-        if b"compiled" in text:
-            digest.update(str(path.relative_to(package)).encode() + b"\0" + text)
+    digest = source_digest(package)
     stamp = package / "__pycache__" / "compiled.sha256"
     known = stamp.read_text() if stamp.exists() else ""
-    if known == digest.hexdigest():
+    if known == digest:
         return False
     for pattern in ("*.nbi", "*.nbc"):
         for path in package.rglob(f"__pycache__/{pattern}"):
             path.unlink(missing_ok=True)
     stamp.parent.mkdir(exist_ok=True)
-    stamp.write_text(digest.hexdigest())
+    stamp.write_text(digest)
     return True
 
 
-# Where nothing may be written, nothing is kept beside the source, and nothing there is stale.
-with contextlib.suppress(PermissionError):
-    forget_stale(Path(__file__).parent)
+class _Compilation(event.Listener):
+    def __init__(self, tell: Callable[[], None]) -> None:
+        self._tell = tell
+
+    def on_start(self, event: Any) -> None:
+        self._tell()
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+@contextlib.contextmanager
+def on_compilation(tell: Callable[[], None]) -> Iterator[None]:
+    """Within it, `tell` is called whenever a function is compiled that was not found on disk."""
+    with event.install_listener("numba:compile", _Compilation(tell)):
+        yield
+
+
+def cache_folder(package: Path, digest: str) -> str:
+    """Where Numba may keep what it compiles: "" beside the source, as usual, or where that cannot
+    be written, as by one who did not install it, a folder of this user's own."""
+    beside = (package, package / "__pycache__")
+    if all(os.access(path, os.W_OK) for path in beside if path.exists()):
+        return ""
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    for parent in (home, tempfile.gettempdir()):
+        folder = Path(parent) / f"numba-orclab-{os.getuid()}" / digest
+        with contextlib.suppress(OSError):
+            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+            if _is_own(folder.parent) and _is_own(folder):
+                return str(folder)
+    return tempfile.mkdtemp(prefix="numba-orclab-")
+
+
+def _is_own(folder: Path) -> bool:
+    """Whether nobody else may write to it: code is loaded from there."""
+    about = folder.lstat()
+    safe = about.st_uid == os.getuid() and not about.st_mode & 0o022
+    return safe and not folder.is_symlink() and os.access(folder, os.W_OK)
+
+
+def _prepare_cache(package: Path) -> None:
+    if os.environ.get("NUMBA_CACHE_DIR"):
+        return  # somebody chose a place
+    if folder := cache_folder(package, source_digest(package)[:16]):
+        os.environ["NUMBA_CACHE_DIR"] = folder
+        config.reload_config()  # type: ignore[no-untyped-call]
+    else:
+        forget_stale(package)
+
+
+_prepare_cache(Path(__file__).parent)

@@ -162,6 +162,11 @@ class Lab(abc.ABC, Generic[P, S]):
         field's or a note's, too."""
         return {}
 
+    def results(self, params: P, state: S) -> Mapping[str, np.ndarray]:
+        """What a saved solution says to other programs, beside the fields: matrices, gains, values,
+        policies, by the names of the notes. It is never read back."""
+        return {}
+
     @abc.abstractmethod
     def draw(self, scene: Scene, params: P, state: S) -> None:
         """Draws one frame."""

@@ -5,6 +5,7 @@ In a unit, an axis or the label of a curve, `{name}` stands for what `Lab.labels
 present parameters. A plot with `when`, such as `when={"world": ("pendulum",)}`, is there only
 while each of these parameters has one of its values."""
 
+import dataclasses
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
@@ -80,7 +81,8 @@ class Trace:
 class Curves:
     """Traces in one chart: a trajectory in a plane, eigenvalues as points, errors over steps. On a
     logarithmic axis what is not positive is left out. `equal` gives both axes one scale; the guide
-    is the line or the circle that parts the stable from the unstable."""
+    is the line or the circle that parts the stable from the unstable. With `gaps` y may be NaN
+    where there is no value: the point is left out."""
 
     title: str
     x_label: str
@@ -90,6 +92,7 @@ class Curves:
     log_y: bool
     guide: Guide
     equal: bool
+    gaps: bool
     when: When
 
     def __init__(
@@ -102,11 +105,12 @@ class Curves:
         log_y: bool = False,
         guide: Guide = "none",
         equal: bool = False,
+        gaps: bool = False,
         when: When = ALWAYS,
     ) -> None:
         labels = {"title": title, "x_label": x_label, "y_label": y_label}
         _set(self, **labels, traces=traces, log_x=log_x, log_y=log_y, guide=guide, equal=equal)
-        _set(self, when=when)
+        _set(self, gaps=gaps, when=when)
 
 
 @dataclass(frozen=True)
@@ -141,6 +145,7 @@ class Matrix:
     unit: str = ""
     shade: bool = False
     rows: str = ""
+    when: When = dataclasses.field(default_factory=dict, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -158,6 +163,7 @@ class Bars:
     marks: str = ""
     gaps: bool = False
     names: str = ""
+    when: When = dataclasses.field(default_factory=dict, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -178,9 +184,12 @@ class Note:
 
     title: str
     note: str
+    when: When = field(default_factory=dict, kw_only=True)
 
 
-Plot = TimeSeries | Curves | HeatMap | Matrix | Bars | Readout | Note
+Card = TimeSeries | Curves | HeatMap | Matrix | Bars | Note
+"""What has a title and a place of its own."""
+Plot = Card | Readout
 
 
 def measured(plot: Plot) -> tuple[str, ...]:
@@ -208,6 +217,12 @@ def field_names(plot: Plot) -> tuple[str, ...]:
             return ()
 
 
+def is_shown(plot: Plot, params: Mapping[str, Value]) -> bool:
+    """Whether a plot is there under these parameters."""
+    when: When = getattr(plot, "when", ALWAYS)
+    return all(params[name] in values for name, values in when.items())
+
+
 def label_names(plot: Plot) -> tuple[str, ...]:
     """The names of `Lab.labels` a plot may show."""
     match plot:
@@ -229,8 +244,9 @@ def label_names(plot: Plot) -> tuple[str, ...]:
 def fields_with_gaps(plot: Plot) -> tuple[str, ...]:
     """The fields a plot shows in which NaN stands for what has no value."""
     match plot:
-        case Curves(traces=traces):
-            return tuple(trace.note for trace in traces if trace.note)
+        case Curves(traces=traces, gaps=gaps):
+            notes = tuple(trace.note for trace in traces if trace.note)
+            return notes + (tuple(trace.y for trace in traces) if gaps else ())
         case HeatMap(z=z, gaps=True):
             return (z,)
         case Bars(field=field, marks=marks, gaps=True):

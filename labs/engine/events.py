@@ -55,7 +55,7 @@ def _event_of(change: Mapping[str, Any]) -> Event:
             sound = name in ("iterate", "show") and type(value) is int and value >= 0
         case _:
             sound = False
-    if not (sound and type(step) is int and step >= 0 and isinstance(name, str)):
+    if not (sound and type(step) is int and 0 <= step <= 2**53 and isinstance(name, str)):
         raise LabError(f"no change of a run looks like {str(dict(change))[:200]}")
     return Event(step, kind, name, value)
 

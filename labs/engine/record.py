@@ -97,14 +97,18 @@ class Recording:
         return orjson.dumps(document, option=orjson.OPT_SERIALIZE_NUMPY)
 
     def csv(self) -> bytes:
-        """One line of about as a `#` comment, a header, a line a sample."""
+        """A header, a line a sample, and nothing else: what reads tables reads it without options.
+        The other forms hold `about`, and a file beside it may (`description`)."""
         text = io.StringIO()
-        text.write(f"# {json.dumps(self.about)}\n")
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(self.columns)
         for row in self.rows:
             writer.writerow(["" if math.isnan(x) else repr(x) for x in row.tolist()])
         return text.getvalue().encode()
+
+    def description(self) -> bytes:
+        """`about`, for those that have the table alone."""
+        return json.dumps(self.about, indent=1).encode()
 
     def npz(self) -> bytes:
         """An array a channel, and `about` as a JSON string."""

@@ -85,7 +85,7 @@ class World:
                 "it is of another version, or was changed"
             ) from error
         self.params, self.seed = params, solution.seed
-        self._begin(snapshot, solution)
+        self._begin(snapshot, replace(solution, results={}))
 
     def _begin(self, snapshot: Snapshot | None, solution: Solution | None) -> None:
         self.runs += 1
@@ -219,8 +219,9 @@ class World:
         """What is shown of the solver, to be saved. Raises LabError."""
         if self.shown is None:
             raise LabError("the solver has found nothing yet that could be saved")
-        params = self.params.model_dump()
-        return Solution.of(self.entry.slug, params, self.seed, self.shown)
+        solution = Solution.of(self.entry.slug, self.params.model_dump(), self.seed, self.shown)
+        shown = (self.params, self.state)
+        return replace(solution, results={**self.lab.fields(*shown), **self.lab.results(*shown)})
 
     def _accept(self, snapshot: Snapshot) -> None:
         self.state = self.lab.accept(self.params, self.state, snapshot)

@@ -5,20 +5,24 @@ array under the names that lead to it, joined by dots ("policy.K", "knots.0"). A
 under "data", each with dtype, shape and values; an NPZ file has an array each, and all else as
 JSON in the array "about". Durations ("seconds" in a snapshot) are left out: they belong to one
 run on one machine.
+
+Beside them stand the results, for other programs and never read back: what the lab's plots show
+(learning curves, values, policies) and what `Lab.results` adds (an LQR's A, B, K, P and poles); in
+a JSON file under "results", in an NPZ file as "results/NAME".
 """
 
 import io
 import json
-import math
 import zipfile
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from labs.engine.array_files import from_json, from_npz, to_json
 from labs.engine.record import versions
 from labs.engine.snapshots import flatten
 from labs.errors import LabError
@@ -26,9 +30,7 @@ from labs.lab import Snapshot
 from labs.params import Value
 
 FORMS = ("json", "npz")
-MAX_UNPACKED = 256 * 2**20
-"""[bytes] A file that unpacks to more is not read."""
-MAX_ARRAYS = 2000
+RESULTS = "results/"
 KINDS = {"b": "truth values", "i": "whole numbers", "f": "numbers", "c": "complex numbers"}
 KINDS |= {"u": KINDS["i"], "U": "text"}
 
@@ -39,7 +41,7 @@ class _About(BaseModel):
     model_config = ConfigDict(strict=True, allow_inf_nan=False)
 
     lab: Annotated[str, Field(max_length=64)]
-    params: dict[str, float | bool | str]
+    params: Annotated[dict[Annotated[str, Field(max_length=64)], Value], Field(max_length=200)]
     seed: Annotated[int, Field(ge=0, lt=2**32)]
     iteration: Annotated[int, Field(ge=0, le=2**53)]
     done: Annotated[str, Field(max_length=1000)]
@@ -59,6 +61,8 @@ class Solution:
     progress: float | None
     arrays: Mapping[str, np.ndarray]
     """By their flat names."""
+    results: Mapping[str, np.ndarray] = field(default_factory=dict)
+    """What is written for other programs; a file that is read has none."""
 
     @classmethod
     def of(cls, lab: str, params: Mapping[str, Value], seed: int, snapshot: Snapshot) -> "Solution":
@@ -82,7 +86,10 @@ class Solution:
 
     def to_dict(self) -> dict[str, Any]:
         """What the JSON file holds."""
-        return self.about() | {"data": {name: _array_to_json(a) for name, a in self.arrays.items()}}
+        parts = {"data": self.arrays} | ({"results": self.results} if self.results else {})
+        return self.about() | {
+            part: {name: to_json(a) for name, a in arrays.items()} for part, arrays in parts.items()
+        }
 
     def json(self) -> bytes:
         import orjson  # on demand: a headless run without output needs no writer
@@ -92,7 +99,8 @@ class Solution:
     def npz(self) -> bytes:
         data = io.BytesIO()
         about = np.array(json.dumps(self.about()))
-        np.savez_compressed(data, about=about, **self.arrays)  # type: ignore[arg-type]
+        results = {f"{RESULTS}{name}": a for name, a in self.results.items()}
+        np.savez_compressed(data, about=about, **self.arrays, **results)  # type: ignore[arg-type]
         return data.getvalue()
 
     def write(self, form: str) -> bytes:
@@ -104,9 +112,11 @@ class Solution:
     @classmethod
     def read(cls, data: bytes) -> "Solution":
         """What a file holds, JSON or NPZ. Raises LabError."""
+        if data.startswith((b"t,", b"#")):
+            raise LabError("this is a recording as CSV, not a solution: a solution is NPZ or JSON")
         try:
             if data.startswith(b"PK"):
-                arrays = _load_npz(data)
+                arrays = from_npz(data, without=RESULTS)
                 about = json.loads(str(arrays.pop("about")))
                 return cls._checked(about, arrays)
             import orjson  # on demand, as for writing
@@ -114,19 +124,18 @@ class Solution:
             return cls.from_dict(orjson.loads(data))
         except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError) as error:
             raise LabError(f"this is no solution saved by orclab ({_brief(error)})") from None
-        except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError) as error:
+        except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError) as error:
             raise LabError(f"this NPZ file cannot be read ({_brief(error)})") from None
 
     @classmethod
     def from_dict(cls, found: Mapping[str, Any]) -> "Solution":
         """What `to_dict` gave. Raises LabError, ValueError, KeyError or TypeError."""
-        arrays = {
-            str(name): _array_from_json(name, spelled) for name, spelled in found["data"].items()
-        }
-        return cls._checked(found, arrays)
+        _refuse_recording(found)
+        return cls._checked(found, from_json(found["data"]))
 
     @classmethod
     def _checked(cls, about: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> "Solution":
+        _refuse_recording(about)
         try:
             checked = _About.model_validate(
                 {k: about[k] for k in _About.model_fields if k in about}
@@ -173,6 +182,15 @@ class Solution:
     def snapshot(self, own: Sequence[Snapshot]) -> Snapshot:
         """As `Lab.accept` takes it. Raises LabError."""
         return Snapshot(self.iteration, self.fitted(own), self.done, self.progress)
+
+
+def _refuse_recording(about: Mapping[str, Any]) -> None:
+    """Raises LabError where it is a recording that was taken for a solution."""
+    if "covers" in about and "iteration" not in about:
+        raise LabError(
+            f"this is a recording of {str(about.get('lab'))[:64]!r}, not a solution: as JSON it "
+            "is repeated by orclab run --replay FILE"
+        )
 
 
 def _without_durations(data: Mapping[str, Any]) -> dict[str, Any]:
@@ -225,57 +243,6 @@ def _unflatten(model: Any, path: str, arrays: Mapping[str, np.ndarray]) -> Any:
     if isinstance(model, np.ndarray):
         return arrays[path]
     return type(model)(arrays[path].item())
-
-
-def _array_to_json(array: np.ndarray) -> dict[str, Any]:
-    """An array in JSON, bit for bit; of a complex number, its two parts."""
-    if array.dtype.kind == "U":
-        return {"dtype": "str", "shape": array.shape, "values": array.ravel().tolist()}
-    flat = np.ascontiguousarray(array).ravel()
-    parts = flat.view(flat.real.dtype) if array.dtype.kind == "c" else flat
-    return {"dtype": array.dtype.name, "shape": array.shape, "values": parts.tolist()}
-
-
-def _array_from_json(name: str, spelled: Mapping[str, Any]) -> np.ndarray:
-    shape, values, dtype = tuple(spelled["shape"]), spelled["values"], spelled["dtype"]
-    flat: Iterable[Any] = values
-    if dtype == "str":
-        array = np.array([str(value) for value in flat])
-    else:
-        kind = np.dtype(dtype)
-        if kind.kind not in "biufc":
-            raise LabError(f"{name} of the solution holds neither numbers nor text")
-        # What is not a number in JSON was not finite.
-        numbers = [math.nan if value is None else value for value in flat]
-        parts = np.dtype(f"f{kind.itemsize // 2}") if kind.kind == "c" else kind
-        array = np.array(numbers, parts).view(kind)
-    if math.prod(shape) != array.size:
-        raise ValueError(f"{name} has {array.size} values for the shape {shape}")
-    return array.reshape(shape)
-
-
-def _load_npz(data: bytes) -> dict[str, np.ndarray]:
-    """The arrays of an NPZ file, none of which may be larger than it says or hold objects."""
-    with zipfile.ZipFile(io.BytesIO(data)) as packed:
-        members = packed.infolist()
-        if len(members) > MAX_ARRAYS or sum(m.file_size for m in members) > MAX_UNPACKED:
-            raise LabError(
-                f"this NPZ file unpacks to more than {MAX_UNPACKED // 2**20} MiB or "
-                f"{MAX_ARRAYS} arrays: it is not read"
-            )
-        return {m.filename.removesuffix(".npy"): _array(packed.read(m)) for m in members}
-
-
-def _array(content: bytes) -> np.ndarray:
-    stream = io.BytesIO(content)
-    major, _ = np.lib.format.read_magic(stream)
-    read_header = {1: "read_array_header_1_0", 2: "read_array_header_2_0"}[major]
-    shape, _, dtype = getattr(np.lib.format, read_header)(stream)
-    # Before anything of that size is made.
-    if dtype.hasobject or math.prod(shape) * dtype.itemsize != len(content) - stream.tell():
-        raise ValueError("an array in it is not what it says")
-    array: np.ndarray = np.load(io.BytesIO(content), allow_pickle=False)
-    return array
 
 
 def _joined(names: Sequence[str]) -> str:

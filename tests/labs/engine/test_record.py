@@ -7,6 +7,7 @@ import math
 from typing import Any
 
 import numpy as np
+import pandas
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -104,14 +105,20 @@ def test_json_holds_the_same_numbers(recording: Recording) -> None:
 
 def test_csv_holds_the_same_numbers(recording: Recording) -> None:
     text = recording.csv().decode()
-    first, rest = text.split("\n", 1)
-    assert first.startswith("# ")
-    assert json.loads(first[2:]) == json.loads(json.dumps(recording.about))
-    header, *lines = csv.reader(io.StringIO(rest))
+    assert json.loads(recording.description()) == json.loads(json.dumps(recording.about))
+    header, *lines = csv.reader(io.StringIO(text))
     assert header == list(recording.columns)
     read = np.array([[float(cell) if cell else math.nan for cell in line] for line in lines])
     assert np.array_equal(read, recording.rows, equal_nan=True)
     assert lines[0][header.index("late")] == ""
+    assert {len(line) for line in lines} == {len(header)}
+
+
+def test_csv_is_read_by_pandas_without_options(recording: Recording) -> None:
+    table = pandas.read_csv(io.BytesIO(recording.csv()))
+    assert list(table.columns) == list(recording.columns)
+    assert set(map(str, table.dtypes)) == {"float64"}
+    assert np.allclose(table.to_numpy(), recording.rows, rtol=1e-15, equal_nan=True)
 
 
 def test_npz_holds_the_same_numbers(recording: Recording) -> None:
@@ -135,7 +142,7 @@ def test_every_double_survives_json_and_csv(values: list[float]) -> None:
     recording = Recording({}, recorder.columns, recorder.since(0), recorder.channels())
     read = json.loads(recording.json())["channels"]["x"]
     assert np.array(read).tobytes() == np.array(values).tobytes()
-    lines = recording.csv().decode().splitlines()[2:]
+    lines = recording.csv().decode().splitlines()[1:]
     written = [float(line.split(",")[1]) for line in lines]
     assert np.array(written).tobytes() == np.array(values).tobytes()
 

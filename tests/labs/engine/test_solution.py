@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from labs.engine.array_files import MAX_ARRAYS, MAX_UNPACKED
 from labs.engine.catalog import find
 from labs.engine.events import Event, events_of
 from labs.engine.headless import run
 from labs.engine.run import World
 from labs.engine.snapshots import flatten
-from labs.engine.solution import MAX_ARRAYS, MAX_UNPACKED, Solution
+from labs.engine.solution import Solution
 from labs.errors import LabError, ParameterError
 from labs.lab import Snapshot
 
@@ -157,9 +158,9 @@ def plain(**changes: Any) -> bytes:
     return json.dumps(descended().solution().to_dict() | changes).encode()
 
 
-def packed(**members: bytes) -> bytes:
+def packed(how: int = zipfile.ZIP_DEFLATED, **members: bytes) -> bytes:
     stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(stream, "w", how) as archive:
         for name, content in members.items():
             archive.writestr(f"{name}.npy", content)
     return stream.getvalue()
@@ -179,6 +180,21 @@ def claims(shape: tuple[int, ...]) -> bytes:
     return stream.getvalue() + bytes(8)
 
 
+def headed(header: str) -> bytes:
+    """An array with such a header, of 8 bytes."""
+    return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header.encode() + bytes(8)
+
+
+def spelled(dtype: object, values: object, shape: object = (1,)) -> bytes:
+    return plain(data={"x": {"dtype": dtype, "shape": shape, "values": values}})
+
+
+def torn(content: bytes) -> bytes:
+    """With some bytes of its first member turned over."""
+    return content[:60] + bytes(255 - byte for byte in content[60:90]) + content[90:]
+
+
+LONG = npy(np.array("x" * 1000))
 UNREADABLE = {
     "nothing": b"",
     "no JSON": b"{",
@@ -201,20 +217,49 @@ UNREADABLE = {
     "pickled": packed(about=npy(np.array([{"a": 1}], dtype=object))),
     "about nothing": packed(about=npy(np.array("{}"))),
     "boasting": packed(about=npy(np.array("{}")), x=claims((10**12,))),
-    "many": packed(**{f"x{k}": b"" for k in range(MAX_ARRAYS + 1)}),
+    "one long text and many short ones": spelled("str", ["x" * 400_000] + 699 * [""], (700,)),
+    "a shape of many axes": spelled("float64", [1.0], [2**31] * 50_000),
+    "a shape of texts": spelled("float64", [1.0], "1"),
+    "a dtype of many": spelled("f8," * 9_000, [1.0]),
+    "a dtype of parts": spelled({"names": ["a"], "formats": ["f8"]}, [1.0]),
+    "numbers as text": spelled("float64", ["9" * 100_000]),
+    "numbers in lists": spelled("float64", [[1.0]]),
+    "text as numbers": spelled("str", [1]),
+    "an endless number": plain().replace(b'"seed": 0', b'"seed": 1' + b"0" * 5_000),
+    "a long name": plain(data={"x" * 201: {"dtype": "bool", "shape": [], "values": [True]}}),
+    "many parameters": plain(params={f"p{k}": 1.0 for k in range(201)}),
+    "packed by LZMA": packed(zipfile.ZIP_LZMA, about=LONG),
+    "torn LZMA": torn(packed(zipfile.ZIP_LZMA, about=LONG)),
+    "torn BZ2": torn(packed(zipfile.ZIP_BZIP2, about=LONG)),
+    "torn": torn(packed(about=LONG)),
+    "a header of parentheses": packed(about=headed("(" * 5_000)),
+    "a header of numbers": packed(about=headed("(" + "1," * 5_000 + ")")),
+    "a header of an endless number": packed(about=headed("1" * 60_000)),
+    "letters that are none": packed(about=npy(np.array("{}"))[:-8] + b"\xff\xff\xff\x7f" * 2),
+    "half a letter": packed(about=npy(np.array("{}"))[:-8] + b"\x00\xd8\x00\x00" * 2),
+    "deep about": packed(about=npy(np.array("[" * 100_000))),
+    "many": packed(zipfile.ZIP_STORED, **{f"x{k}": b"" for k in range(MAX_ARRAYS + 1)}),
 }
 
 
 @pytest.mark.parametrize("content", UNREADABLE.values(), ids=UNREADABLE)
 def test_what_is_no_solution_is_refused_in_a_sentence(content: bytes) -> None:
-    with pytest.raises(LabError, match=r"\w+ \w+ \w+"):
+    with pytest.raises(LabError, match=r"\w+ \w+ \w+") as refused:
         Solution.read(content)
+    assert len(str(refused.value)) < 300
+
+
+@pytest.mark.parametrize("form", ["json", "npz", "csv"])
+def test_a_recording_is_named_as_one(form: str) -> None:
+    recording = run("descent", seconds=0.1).recording().write(form)
+    with pytest.raises(LabError, match=r"this is a recording .*, not a solution"):
+        Solution.read(recording)
 
 
 def test_a_file_that_unpacks_to_too_much_is_not_unpacked() -> None:
     bomb = packed(about=bytes(MAX_UNPACKED + 1))
     assert len(bomb) < 1e6
-    with pytest.raises(LabError, match="unpacks to more than 256 MiB"):
+    with pytest.raises(LabError, match="unpacks to more than 64 MiB"):
         Solution.read(bomb)
 
 

@@ -5,14 +5,16 @@ import contextlib
 import tempfile
 from collections.abc import AsyncIterator
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Body, FastAPI, Request
+from fastapi import APIRouter, Body, FastAPI, Query, Request
 from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
 from labs.engine.catalog import catalog, find
+from labs.engine.plot_data import file_name
 from labs.engine.record import versions
+from labs.errors import LabError
 from server import pages, problems, proxy, stream
 from server.commands import Command, execute
 from server.guard import Guard
@@ -25,11 +27,18 @@ from server.messages import (
     ParamValues,
     SessionInfo,
 )
-from server.sessions import Session, Sessions, Unavailable
+from server.scratch import scratch_folder
+from server.session import Session, Unavailable
+from server.sessions import Sessions
 from server.settings import Settings
 from server.supervisor import Supervisor
 
-MEDIA = {"json": "application/json", "csv": "text/csv", "npz": "application/octet-stream"}
+MEDIA = {
+    "json": "application/json",
+    "csv": "text/csv",
+    "npz": "application/octet-stream",
+    "zip": "application/zip",
+}
 api = APIRouter(prefix="/api", responses=problems.RESPONSES)
 
 
@@ -42,10 +51,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         supervisor = Supervisor(settings)
         sessions = Sessions(settings, supervisor)
-        with tempfile.TemporaryDirectory(prefix="orclab-") as folder:
+        with scratch_folder() as folder:
             app.state.supervisor, app.state.sessions = supervisor, sessions
-            app.state.folder = Path(folder)
-            app.state.settings = settings
+            app.state.folder = folder
             supervisor.start()
             sessions.start()
             yield
@@ -59,7 +67,9 @@ def create_app(settings: Settings | None = None) -> FastAPI:
         lifespan=lifespan,
         docs_url=None,  # its pages load scripts from elsewhere; ours does not
         redoc_url=None,
+        redirect_slashes=False,  # it would name an address as seen behind a proxy
     )
+    app.state.settings = settings
     app.add_middleware(Guard, settings=settings)
     app.include_router(api)
     app.include_router(health)
@@ -151,7 +161,7 @@ async def command_line(request: Request, session_id: str) -> CommandLine:
 @api.get(
     "/sessions/{session_id}/export.{form}",
     response_class=FileResponse,
-    responses={200: {"content": {media: {} for media in MEDIA.values()}}},
+    responses={200: {"content": {MEDIA[form]: {} for form in ("json", "csv", "npz")}}},
 )
 async def export(
     request: Request, session_id: str, form: Literal["json", "csv", "npz"]
@@ -172,6 +182,26 @@ async def save_solution(
     """What is shown of the solver, with the parameters and the seed it belongs to."""
     session = _session(request, session_id)
     return await _file(request, session, "solution", form, f"{session.entry.slug}-solution.{form}")
+
+
+@api.get(
+    "/sessions/{session_id}/plots.{form}",
+    response_class=FileResponse,
+    responses={200: {"content": {MEDIA[form]: {} for form in ("csv", "json", "zip")}}},
+)
+async def plots(
+    request: Request,
+    session_id: str,
+    form: Literal["csv", "json", "zip"],
+    title: Annotated[str, Query(max_length=200)] = "",
+) -> FileResponse:
+    """What the plots show now, in full precision: the one of this title, or all; CSV is of one."""
+    session = _session(request, session_id)
+    if form == "csv" and not title:
+        raise LabError("a table is of one plot: name its title, or take plots.zip")
+    name = "-".join(filter(None, (session.entry.slug, file_name(title) if title else "plots")))
+    titles = [title] if title else []
+    return await _file(request, session, "plots", form, f"{name}.{form}", titles=titles)
 
 
 @api.put(
@@ -201,12 +231,12 @@ async def load_solution(request: Request, session_id: str) -> ParamValues:
 
 
 async def _file(
-    request: Request, session: Session, what: str, form: str, name: str
+    request: Request, session: Session, what: str, form: str, name: str, **more: Any
 ) -> FileResponse:
     """A file that the session's worker writes."""
     path = _temporary(request)
     try:
-        await session.write(what, form, str(path))
+        await session.write(what, form, str(path), **more)
     except BaseException:
         path.unlink()
         raise

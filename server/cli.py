@@ -1,26 +1,29 @@
 """The `orclab` command: serve the labs, list them, run one headless."""
 
 import argparse
-import asyncio
 import json
-import socket
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
-
-from pydantic import ValidationError
 
 from labs.engine.catalog import catalog, find
 from labs.engine.events import Event, events_of, parse_event
 from labs.engine.headless import run
+from labs.engine.plot_data import PlotData
 from labs.engine.record import versions
 from labs.engine.run import World
 from labs.engine.solution import FORMS as SOLUTION_FORMS
 from labs.engine.solution import Solution
 from labs.errors import LabError
 
-FORMS = ("json", "csv", "npz")
+Writer = Callable[[World, str], bytes]
+OUTPUTS: Mapping[str, tuple[Sequence[str], Writer]] = {
+    "--out": (("json", "csv", "npz"), lambda world, form: world.recording().write(form)),
+    "--solution-out": (SOLUTION_FORMS, lambda world, form: world.solution().write(form)),
+    "--plots-out": (("json", "zip"), lambda world, form: PlotData.of(world).write(form)),
+}
+"""What a run writes: the forms, by a file's ending, and how."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -75,6 +78,9 @@ def _parser() -> argparse.ArgumentParser:
     runner.add_argument(
         "--solution-out", type=Path, metavar="F", help="write the solution: F.json or F.npz"
     )
+    runner.add_argument(
+        "--plots-out", type=Path, metavar="F", help="write the data of all plots: F.json or F.zip"
+    )
     return parser
 
 
@@ -90,74 +96,9 @@ def _serving(parser: argparse.ArgumentParser) -> None:
 
 
 def _serve(options: argparse.Namespace) -> int:
-    import uvicorn  # on demand: a headless run needs no web server
-    from pydantic_settings import SettingsError
+    from server.serving import serve  # on demand: a headless run needs no web server
 
-    from server.app import create_app
-    from server.settings import Settings
-
-    given = {name: getattr(options, name) for name in ("host", "port") if name in options}
-    try:
-        settings = Settings(**given)
-    except (ValidationError, SettingsError) as error:
-        raise LabError(_wrong_settings(error)) from None
-    listener = _listen(settings.host, settings.port)
-    host, port = listener.getsockname()[:2]
-    shown = f"[{host}]" if ":" in host else host
-    address = f"http://{shown}:{port}"
-    config = uvicorn.Config(
-        create_app(settings),
-        loop="uvloop",
-        ws="websockets-sansio",
-        ws_max_size=64 * 2**20,
-        ws_per_message_deflate=False,
-        log_level="warning",
-        timeout_graceful_shutdown=2,
-        server_header=False,
-    )
-    server = uvicorn.Server(config)
-
-    async def announce() -> None:
-        while not server.started:
-            await asyncio.sleep(0.02)
-        print(f"orclab is at {address}  (Ctrl+C ends it)", flush=True)
-        if getattr(options, "open", False):
-            import webbrowser
-
-            await asyncio.to_thread(webbrowser.open, address)
-
-    async def serve() -> None:
-        announcing = asyncio.create_task(announce())
-        await server.serve([listener])
-        announcing.cancel()
-
-    with asyncio.Runner(loop_factory=config.get_loop_factory()) as runner:
-        runner.run(serve())
-    return 0
-
-
-def _wrong_settings(error: Exception) -> str:
-    if not isinstance(error, ValidationError):
-        return f"ORCLAB_ORIGINS takes a JSON list of addresses ({error})"
-    return "; ".join(
-        f"ORCLAB_{str(e['loc'][0]).upper()} = {str(e['input'])[:80]}: {e['msg']}"
-        for e in error.errors()
-    )
-
-
-def _listen(host: str, port: int) -> socket.socket:
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    listener = socket.socket(family, socket.SOCK_STREAM)
-    listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    try:
-        listener.bind((host, port))
-    except OSError as error:
-        listener.close()
-        raise LabError(
-            f"cannot listen on {host} port {port} ({error.strerror}): "
-            "choose another with --port, or --port 0 for any free one"
-        ) from None
-    return listener
+    return serve(options)
 
 
 def _list(_: argparse.Namespace) -> int:
@@ -167,22 +108,22 @@ def _list(_: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    outputs: list[tuple[str, Path, Callable[[World, str], bytes]]] = []
-    if options.out:
-        _check_output("--out", options.out, FORMS)
-        outputs.append(("--out", options.out, lambda world, form: world.recording().write(form)))
-    if options.solution_out:
-        _check_output("--solution-out", options.solution_out, SOLUTION_FORMS)
-        outputs.append(
-            ("--solution-out", options.solution_out, lambda w, form: w.solution().write(form))
-        )
+    outputs: list[tuple[str, Path, Writer]] = []
+    for option, (forms, write) in OUTPUTS.items():
+        path = getattr(options, option[2:].replace("-", "_"))
+        if path:
+            _check_output(option, path, forms)
+            outputs.append((option, path, write))
+            if option == "--out" and path.suffix == ".csv":
+                beside = path.with_suffix(".about.json")
+                outputs.append((option, beside, lambda world, _: world.recording().description()))
     plan = _arguments_of_recording(options) if options.replay else _arguments_of_options(options)
     if options.seconds is not None:
         plan["seconds"] = options.seconds
     world = run(**plan, progress=_progress if sys.stderr.isatty() else None)
-    for option, path, content in outputs:
+    for option, path, write in outputs:
         try:
-            path.write_bytes(content(world, path.suffix[1:]))
+            path.write_bytes(write(world, path.suffix[1:]))
         except OSError as error:
             raise LabError(f"{option} {path}: {error.strerror}") from None
         print(f"wrote {path}", file=sys.stderr)
@@ -199,7 +140,8 @@ def _run(options: argparse.Namespace) -> int:
         "trouble": world.trouble,
         "solver": (world.latest and world.latest.done) or None,
     }
-    print(json.dumps(final | measured))
+    notes = world.lab.notes(world.params, world.state)
+    print(json.dumps(final | measured | ({"notes": dict(notes)} if notes else {})))
     return 0
 
 
@@ -251,7 +193,14 @@ def _arguments_of_recording(options: argparse.Namespace) -> dict[str, Any]:
         }
     except OSError as error:
         raise LabError(f"--replay {path}: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (
+        ValueError,
+        LookupError,
+        TypeError,
+        AttributeError,
+        ArithmeticError,
+        RecursionError,
+    ) as error:
         raise LabError(f"--replay {path}: not a JSON export of orclab ({error!r})") from None
 
 

@@ -4,9 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from labs.params import Params
 from server.messages import Changes, Finite, Message, View
-from server.sessions import Session
+from server.session import Session
 
 
 class Run(Message):
@@ -134,11 +133,6 @@ Command = Annotated[WorldCommand | SolverCommand, Field(discriminator="command")
 
 async def execute(session: Session, command: Command) -> None:
     """Does it. Raises LabError, Unavailable."""
-    lab = session.entry.lab
-    if isinstance(command, Apply):
-        defaults: Params = lab.Params()
-        defaults.change(command.params)
-        defaults.change(command.compare.params if command.compare else {})
     if isinstance(command, Press):
-        lab.check_action(command.action)
+        session.entry.lab.check_action(command.action)
     await session.ask(command.command, **command.model_dump(exclude={"command"}))

@@ -1,7 +1,9 @@
-"""What every request passes: who may ask (Host, Origin), and how much (body size)."""
+"""What every request passes: where the server is (a path prefix), who may ask (Host, Origin), how
+much (body size); and what every answer says to the browser."""
 
 from urllib.parse import urlsplit
 
+from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -10,18 +12,27 @@ from server.settings import Settings
 
 LOOPBACK = {"127.0.0.1", "localhost", "::1"}
 SAFE = {"GET", "HEAD", "OPTIONS"}
+HEADERS = {
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "same-origin",
+    # Of what is no page: it loads nothing, should somebody open it as one.
+    "Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; "
+    "frame-ancestors 'self'; base-uri 'none'; form-action 'none'",
+}
 
 
 class Guard:
     """ASGI middleware. A page of another origin may neither change anything nor open a
     WebSocket; a name that only pretends to be this machine (DNS rebinding) is refused; a body
-    larger than allowed is not read."""
+    larger than allowed is not read. HEAD is answered as GET is, without the body."""
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self._app = app
+        self._prefix = settings.root_path
         self._limits = settings.max_body_bytes, settings.max_solution_bytes
         self._origins = set(settings.origins)
-        self._hosts = LOOPBACK if settings.host in LOOPBACK else None
+        named = {_hostname(urlsplit(origin).netloc) for origin in settings.origins}
+        self._hosts = LOOPBACK | named if settings.host in LOOPBACK else None
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] not in ("http", "websocket"):
@@ -29,25 +40,42 @@ class Guard:
             return
         headers = {k.decode("latin-1"): v.decode("latin-1") for k, v in scope["headers"]}
         refusal = self._refusal(scope, headers)
+        sending = _with_headers(send)
         if refusal is None:
-            await self._app(scope, _bounded(receive, self._limit(scope)), send)
+            inside = self._inside(scope)
+            await self._app(inside, _bounded(receive, self._limit(inside)), sending)
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008, "reason": refusal[1][:120]})
         else:
             status, sentence, code = refusal
             response = JSONResponse({"error": sentence, "code": code}, status)
-            await response(scope, receive, send)
+            await response(scope, receive, sending)
+
+    def _inside(self, scope: Scope) -> Scope:
+        """As the application sees it: without the prefix, which some proxies take away and others
+        leave there; and a HEAD as the GET whose body uvicorn keeps back."""
+        path, raw = scope["path"], scope.get("raw_path") or b""
+        prefix = self._prefix.encode()
+        if self._prefix and path.startswith(f"{self._prefix}/"):
+            path = path.removeprefix(self._prefix)
+            raw = raw.removeprefix(prefix) if raw.startswith(prefix) else path.encode()
+        method = {"method": "GET"} if scope.get("method") == "HEAD" else {}
+        return {**scope, "path": path, "raw_path": raw, **method}
 
     def _refusal(self, scope: Scope, headers: dict[str, str]) -> tuple[int, str, str] | None:
         host = headers.get("host", "")
         if self._hosts is not None and _hostname(host) not in self._hosts:
-            return 403, f"this server answers to localhost, not to {host[:80]!r}", "wrong-host"
+            sentence = f"this server answers to localhost, not to {host[:80]!r}: behind a proxy, "
+            sentence += "ORCLAB_ORIGINS names the address it has there"
+            return 403, sentence, "wrong-host"
         origin = headers.get("origin")
         changes = scope["type"] == "websocket" or scope["method"] not in SAFE
         if origin and changes and not self._allowed(origin, host):
-            return 403, f"pages of {origin[:80]!r} may not use this server", "wrong-origin"
+            sentence = f"pages of {origin[:80]!r} may not use this server, unless ORCLAB_ORIGINS "
+            return 403, sentence + "names them", "wrong-origin"
         length = headers.get("content-length", "0")
-        if not length.isdigit() or int(length) > self._limit(scope):
+        bounded = length.isascii() and length.isdecimal() and len(length) < 16
+        if not bounded or int(length) > self._limit(scope):
             return 413, _too_large(self._limit(scope)), "too-large"
         return None
 
@@ -58,7 +86,21 @@ class Guard:
         return solution if is_solution else usual
 
     def _allowed(self, origin: str, host: str) -> bool:
-        return origin in self._origins or urlsplit(origin).netloc == host
+        try:
+            return origin in self._origins or urlsplit(origin).netloc == host
+        except ValueError:  # http://[
+            return False
+
+
+def _with_headers(send: Send) -> Send:
+    async def sending(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            for name, value in HEADERS.items():
+                headers.setdefault(name, value)
+        await send(message)
+
+    return sending
 
 
 def _bounded(receive: Receive, limit: int) -> Receive:

@@ -15,6 +15,7 @@ import viser
 
 from labs.engine.catalog import find
 from labs.engine.headless import run
+from labs.engine.plot_data import PlotData
 from labs.engine.run import World
 from labs.engine.solution import Solution
 from labs.errors import LabError
@@ -206,6 +207,9 @@ class LiveSession:
 
     def _do_solution(self, form: str, path: str, done: int) -> None:
         self._write(functools.partial(self.world.solution().write, form), path, done)
+
+    def _do_plots(self, form: str, path: str, done: int, titles: list[str]) -> None:
+        self._write(functools.partial(PlotData.of(self.world, titles).write, form), path, done)
 
     def _write(self, content: Callable[[], bytes], path: str, done: int) -> None:
         """Writes to `path`, on a thread of its own, and then answers `done`."""

@@ -36,7 +36,8 @@ class NewSession(Message):
     lab: Annotated[str, Field(max_length=64)]
     params: Changes = {}
     link: LinkTexts = {}
-    """Further parameters, as texts: what a page's address says."""
+    """Parameters and the seed as texts: what a page's address says. What it cannot mean is left
+    out, with a remark; `params` count where both name one."""
     seed: Annotated[int, Field(ge=0, le=2**32 - 1)] = 0
     view: View = View()
 
@@ -51,6 +52,8 @@ class SessionInfo(Message):
     """Path of the 3D scene, for an iframe."""
     stream: str
     """Path of the WebSocket that tells what happens."""
+    remarks: list[str]
+    """On each part of the link that could not hold as it was."""
 
 
 class LabInfo(Message):

@@ -37,15 +37,15 @@ class Pacer:
     def advance(self, now: float, until: float) -> None:
         """The steps that are due; none begins after `until` [s]."""
         before = self._world.steps
+        # Given up first: a machine that slept does not rush through the night.
+        lag = self._steps_due(now) * self._world.lab.period / self.speed
+        self._wall0 += max(0.0, lag - SLIP)
         for _ in range(int(self._steps_due(now))):
             if self._world.trouble or self.is_held() or time.perf_counter() > until:
                 break
             self._world.advance()
         self._spent += time.perf_counter() - now
         self._taken += self._world.steps - before
-        lag = self._steps_due(now) * self._world.lab.period / self.speed
-        if lag > SLIP:
-            self._wall0 += lag - SLIP
 
     def is_held(self) -> bool:
         """Whether the time to hold has come: exactly, however fast it went."""

@@ -28,7 +28,6 @@ STATIC = Path(__file__).parent.parent / "static"
 VENDOR = {
     "uplot.js": ("uplot", "uplot-python", "static/uPlot.iife.js", "text/javascript"),
     "uplot.css": ("uplot", "uplot-python", "static/uPlot.min.css", "text/css"),
-    "plotly.js": ("plotly", "plotly", "package_data/plotly.min.js", "text/javascript"),
     "swagger.js": (
         "fastapi_offline",
         "fastapi-offline",
@@ -49,8 +48,8 @@ def install(app: FastAPI) -> None:
 
 
 def vendor_url(name: str) -> str:
-    """Where a file from a wheel is served; a new version of the wheel is a new address."""
-    return f"/vendor/{name}?v={version(VENDOR[name][1])}"
+    """Where a file from a wheel is served, from the root; a new version is a new address."""
+    return f"vendor/{name}?v={version(VENDOR[name][1])}"
 
 
 def own_version() -> str:
@@ -116,10 +115,7 @@ def favicon() -> Response:
 def vendor(name: str) -> Response:
     if name not in VENDOR:
         return Response(status_code=404)
-    headers = {
-        "Cache-Control": "public, max-age=31536000, immutable",
-        "X-Content-Type-Options": "nosniff",
-    }
+    headers = {"Cache-Control": "public, max-age=31536000, immutable"}
     return FileResponse(_vendor_file(name), media_type=VENDOR[name][3], headers=headers)
 
 
@@ -144,7 +140,6 @@ def lab_data(entry: Entry) -> dict[str, Any]:
         "has_world": lab.has_world(),
         "has_solver": lab.has_solver(),
         "version": own_version(),
-        "vendor": {"plotly": vendor_url("plotly.js")},
     }
 
 
@@ -177,22 +172,26 @@ def _chapters() -> list[tuple[str, str, list[Entry]]]:
 
 
 def _page(request: Request, template: str, status: int = 200, **context: Any) -> HTMLResponse:
-    html = _templates().get_template(template).render(path=request.url.path, **context)
-    host = request.headers.get("host", "")
-    # The scene and the stream are WebSockets of this host; not every browser takes 'self' for it.
-    sockets = f" ws://{host} wss://{host}" if re.fullmatch(r"[\w.:\[\]-]+", host) else ""
+    # Relative, so that a page also works behind a proxy that puts it under a prefix.
+    root = "../" * (request.scope["raw_path"].count(b"/") - 1) or "./"
+    html = _templates().get_template(template).render(root=root, **context)
     policy = (
         "default-src 'self'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
-        f"img-src 'self' data: blob:; connect-src 'self'{sockets}; frame-src 'self'; "
+        f"img-src 'self' data: blob:; connect-src 'self'{sockets(request)}; frame-src 'self'; "
         "frame-ancestors 'self'; object-src 'none'; base-uri 'none'; form-action 'self'"
     )
-    headers = {
-        "Content-Security-Policy": policy,
-        "X-Content-Type-Options": "nosniff",
-        "Referrer-Policy": "same-origin",
-        "Cache-Control": "no-cache",
-    }
-    return HTMLResponse(html, status, headers)
+    return HTMLResponse(
+        html, status, {"Content-Security-Policy": policy, "Cache-Control": "no-cache"}
+    )
+
+
+def sockets(request: Request) -> str:
+    """What a page's policy says of the scene's and the stream's WebSockets, which are of this host:
+    not every browser takes 'self' for them. Behind a proxy the host may have another name."""
+    origins = request.app.state.settings.origins
+    hosts = [request.headers.get("host", ""), *(origin.split("//")[1] for origin in origins)]
+    sound = [host for host in hosts if re.fullmatch(r"[\w.:\[\]-]+", host)]
+    return "".join(f" ws://{host} wss://{host}" for host in sound)
 
 
 @cache
@@ -235,7 +234,6 @@ class _Static(StaticFiles):
     def file_response(self, *args: Any, **kwargs: Any) -> Response:
         response = super().file_response(*args, **kwargs)
         response.headers["Cache-Control"] = "no-cache"
-        response.headers["X-Content-Type-Options"] = "nosniff"
         return response
 
     async def get_response(self, path: str, scope: Scope) -> Response:

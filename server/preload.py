@@ -2,37 +2,52 @@
 
 import gc
 import os
+import sys
 import threading
 
 import server.worker  # noqa: F401  (imports Viser, Pinocchio and all labs' code)
-from labs.engine.catalog import catalog
+from labs.compiled import on_compilation
+from labs.engine.catalog import Entry, catalog
+from labs.errors import LabError
 from labs.models.arms import ARMS, load
 from server import meshes
 
-PATIENCE = 2.0
+WHAT = "compiling the solvers, once; this may take a minute ..."
+PATIENCE = 1.0
 """[s] Compiling that takes longer is told on the terminal."""
 
 
-def _announce_compilation(parent: int, over: threading.Event) -> None:
+def _watch(parent: int, compiling: threading.Event, over: threading.Event) -> None:
     """Says why it takes long, and ends with the server: who compiles hears of nothing else."""
-    if not over.wait(PATIENCE):
-        print("First start: compiling the solvers, once; this may take a minute ...", flush=True)
+    since = 0.0
     while not over.wait(0.25):
         if os.getppid() != parent:
             os._exit(1)
+        if compiling.is_set() and since < PATIENCE:
+            since += 0.25
+            if since >= PATIENCE:
+                print(f"First start: {WHAT}", flush=True)
 
 
 def _prepare() -> None:
     """Compiled code is kept on disk: a second start finds it."""
-    over = threading.Event()
-    waiting = threading.Thread(target=_announce_compilation, args=(os.getppid(), over))
+    compiling, over = threading.Event(), threading.Event()
+    waiting = threading.Thread(target=_watch, args=(os.getppid(), compiling, over))
     waiting.start()
     try:
-        for entry in catalog().values():
-            entry.lab.prepare()
+        with on_compilation(compiling.set):
+            for entry in _entries():
+                entry.lab.prepare()
     finally:
         over.set()
         waiting.join()  # a process with a second thread had better not be forked
+
+
+def _entries() -> list[Entry]:
+    try:
+        return list(catalog().values())
+    except LabError:
+        sys.exit(1)  # the web process finds it too, and says it
 
 
 _prepare()

@@ -1,5 +1,7 @@
 """What a refused request answers: a sentence for people, a code for programs."""
 
+import errno
+import logging
 from collections.abc import Sequence
 from typing import Any
 
@@ -7,12 +9,18 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 
 from labs.errors import LabError, UnknownLab
 from server import pages
+from server.guard import HEADERS
 from server.messages import Problem
-from server.sessions import NoSession, SessionsFull, Unavailable
+from server.session import Unavailable
+from server.sessions import NoSession, SessionsFull
 
+log = logging.getLogger("orclab.requests")
+
+NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EMFILE, errno.ENFILE, errno.ENOMEM}
 STATUS_OF: dict[type[LabError], tuple[int, str]] = {
     UnknownLab: (404, "unknown-lab"),
     NoSession: (404, "no-session"),
@@ -38,6 +46,9 @@ def install(app: FastAPI) -> None:
     app.add_exception_handler(LabError, _lab_error)
     app.add_exception_handler(RequestValidationError, _validation_error)
     app.add_exception_handler(HTTPException, _http_error)
+    app.add_exception_handler(ClientDisconnect, _left)
+    app.add_exception_handler(OSError, _no_room)
+    app.add_exception_handler(Exception, _defect)
 
 
 async def _lab_error(_: Request, error: Exception) -> Response:
@@ -67,6 +78,25 @@ async def _http_error(request: Request, error: Exception) -> Response:
         return pages.missing(request, "There is nothing at this address")
     sentence = f"{request.method} {request.url.path[:200]}: {error.detail}"
     return _problem(error.status_code, sentence, "http", error.headers)
+
+
+async def _left(request: Request, _: Exception) -> Response:
+    log.warning("%s %s was broken off", request.method, request.url.path[:200])
+    return Response(status_code=400)  # nobody reads it
+
+
+async def _no_room(_: Request, error: Exception) -> Response:
+    assert isinstance(error, OSError)
+    if error.errno not in NO_ROOM:
+        raise error
+    log.warning("no room: %s", error)
+    sentence = f"the server has no room for this ({error.strerror}): free some, and try again"
+    return _problem(503, sentence, "no-room")
+
+
+async def _defect(request: Request, error: Exception) -> Response:
+    sentence = f"{request.method} {request.url.path[:200]} met a defect of the server"
+    return _problem(500, f"{sentence} ({type(error).__name__})", "defect", HEADERS)
 
 
 def _problem(status: int, error: str, code: str, headers: Any = None) -> Response:

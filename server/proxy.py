@@ -17,6 +17,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
+from server.pages import sockets
 from server.sessions import NoSession, Sessions
 
 router = APIRouter(include_in_schema=False)
@@ -25,8 +26,8 @@ GONE, TRY_AGAIN = 4404, 1013
 CLOSE_SECONDS = 0.5
 """A worker, which may be busy or gone, is not waited for longer: nobody is at that end."""
 OURS = (
-    b'<link rel="stylesheet" href="/static/css/scene.css">'
-    b'<script type="module" src="/static/js/scene.js"></script>'
+    b'<link rel="stylesheet" href="../../static/css/scene.css">'
+    b'<script type="module" src="../../static/js/scene.js"></script>'
 )
 """Put into its head."""
 SCRIPT_END = b"</script>"
@@ -59,7 +60,18 @@ async def scene_page(request: Request, session_id: str) -> Response:
     except NoSession as error:
         return HTMLResponse(f"<!doctype html><title>No scene</title><p>{error}</p>", 404)
     plain, compressed = viser_page()
-    headers = {"Cache-Control": "no-cache", "X-Frame-Options": "SAMEORIGIN"}
+    policy = (
+        # Viser's client is one page with its script in it, which compiles and decodes in workers.
+        "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval' blob: data:; "
+        "worker-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; font-src 'self' data:; "
+        f"img-src 'self' data: blob:; connect-src 'self' data: blob:{sockets(request)}; "
+        "frame-ancestors 'self'; object-src 'none'; base-uri 'none'; form-action 'none'"
+    )
+    headers = {
+        "Cache-Control": "no-cache",
+        "X-Frame-Options": "SAMEORIGIN",
+        "Content-Security-Policy": policy,
+    }
     if "gzip" in request.headers.get("accept-encoding", ""):
         return HTMLResponse(compressed, headers=headers | {"Content-Encoding": "gzip"})
     return HTMLResponse(plain, headers=headers)

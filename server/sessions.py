@@ -1,24 +1,22 @@
-"""Live sessions: who watches, what their parameters are, and what happens when a worker dies."""
+"""All live sessions: bounded in number and in idle time, and brought back when a worker dies."""
 
 import asyncio
 import contextlib
-import secrets
-from collections import deque
-from typing import Any
-
-import orjson
 
 from labs.engine.catalog import Entry
+from labs.engine.links import read_link
 from labs.errors import LabError
 from labs.params import Params
-from server.messages import NewSession, Notice, SessionInfo
-from server.pipe import HELLO, STATUS
+from server.messages import NewSession
+from server.session import CRASHES, Session, Unavailable
 from server.settings import Settings
-from server.supervisor import Supervisor, Worker, WorkerGone
+from server.supervisor import Supervisor, WorkerGone
 from server.tasks import Tasks
-from server.viewers import Viewer
 
-CRASHES, CRASH_SECONDS = 3, 60.0
+LAST_WORDS = 0.5
+"""[s] Viewers are given to hear that the server stops."""
+STOPS = "the server stops: start it again, and open the lab anew"
+STOPPED = "The server was stopped. Once it is started again, this page goes on by itself."
 
 
 class SessionsFull(LabError):
@@ -29,148 +27,6 @@ class NoSession(LabError):
     """No session has this id (any more)."""
 
 
-class Unavailable(LabError):
-    """The session's worker is being replaced."""
-
-
-class Session:
-    """One user's lab."""
-
-    def __init__(self, entry: Entry, params: Params, new: NewSession) -> None:
-        self.id = secrets.token_urlsafe(18)
-        self.entry = entry
-        self.state = "starting"
-        self.worker: Worker | None = None
-        self.viewers: set[Viewer] = set()
-        # What a new worker needs to go on where the last one ended.
-        self._latest: dict[str, Any] = {
-            "params": params.model_dump(),
-            "seed": new.seed,
-            "view": new.view.model_dump(),
-            "running": True,
-            "speed": 1.0,
-            "solver": None,
-        }
-        self._latest_frames: dict[int, bytes] = {}
-        self._crashes: deque[float] = deque(maxlen=CRASHES)
-        now = asyncio.get_running_loop().time()
-        self.watched = self.touched = now
-        """When somebody last watched, and last did something [s, loop's clock]."""
-
-    def info(self) -> SessionInfo:
-        return SessionInfo.model_validate(
-            {
-                "id": self.id,
-                "lab": self.entry.slug,
-                "params": self._latest["params"],
-                "seed": self._latest["seed"],
-                "state": self.state,
-                "scene": f"/scene/{self.id}/",
-                "stream": f"/api/sessions/{self.id}/stream",
-            }
-        )
-
-    async def open(self, supervisor: Supervisor) -> None:
-        """Takes a worker and sets it to work where the last one ended."""
-        worker = await supervisor.take()
-        worker.on_frame = self._on_frame
-        self.worker = worker
-        self.state = "live"
-        worker.send("open", lab=self.entry.slug, **self._latest)
-        worker.send("viewers", count=len(self.viewers))
-
-    async def change(self, changes: dict[str, Any]) -> dict[str, Any]:
-        """New parameters; answers all of them. Raises ParameterError, Unavailable."""
-        self.entry.lab.Params().change(changes)
-        params: dict[str, Any] = await self.ask("params", changes=changes)
-        self._latest["params"] = params
-        return params
-
-    async def ask(self, do: str, **arguments: Any) -> Any:
-        """What the worker answers. Raises LabError, Unavailable."""
-        self.touched = asyncio.get_running_loop().time()
-        try:
-            return await self._live_worker().ask(do, **arguments)
-        except WorkerGone:
-            raise self._unavailable() from None
-
-    async def load(self, path: str) -> dict[str, Any]:
-        """Takes up a solution from a file; answers all parameters. Raises LabError, Unavailable."""
-        params: dict[str, Any] = await self.ask("load", path=path)
-        self._latest["params"] = params
-        return params
-
-    async def write(self, what: str, form: str, path: str) -> None:
-        """Writes the recording ("export") or the solution to a file. Raises as `ask`."""
-        try:
-            await self._live_worker().ask_for_file(what, form, path)
-        except WorkerGone:
-            raise self._unavailable() from None
-
-    def _live_worker(self) -> Worker:
-        if self.worker is None or self.worker.gone:
-            raise self._unavailable()
-        return self.worker
-
-    def _unavailable(self) -> Unavailable:
-        if self.state == "failed":
-            return Unavailable("this session has ended after repeated crashes: open the lab anew")
-        return Unavailable("the simulation is being restarted: try again in a moment")
-
-    # Viewers ------------------------------------------------------------------------------------
-
-    def join(self) -> Viewer:
-        """A page begins to watch."""
-        viewer = Viewer()
-        for payload in self._latest_frames.values():
-            viewer.push(payload, [])
-        self.viewers.add(viewer)
-        self._count()
-        return viewer
-
-    def leave(self, viewer: Viewer) -> None:
-        """A page no longer watches."""
-        self.viewers.discard(viewer)
-        self.watched = asyncio.get_running_loop().time()
-        self._count()
-
-    def notify(self, state: str, text: str) -> None:
-        """Says something to every viewer."""
-        notice = Notice.model_validate({"state": state, "text": text})
-        self._broadcast(notice.model_dump_json().encode())
-
-    def reply(self, viewer: Viewer, payload: bytes) -> None:
-        """Says something to one viewer."""
-        viewer.push(payload, list(self._latest_frames.values()))
-
-    def _count(self) -> None:
-        with contextlib.suppress(WorkerGone):
-            if self.worker:
-                self.worker.send("viewers", count=len(self.viewers))
-
-    def _broadcast(self, payload: bytes) -> None:
-        latest = list(self._latest_frames.values())
-        for viewer in self.viewers:
-            viewer.push(payload, latest)
-
-    def _on_frame(self, kind: int, payload: bytes) -> None:
-        if kind in (HELLO, STATUS):
-            self._latest_frames[kind] = payload
-        if kind == STATUS:
-            status = orjson.loads(payload)
-            for name in self._latest:
-                if name in ("params", "seed") and status[name] != self._latest[name]:
-                    self.touched = asyncio.get_running_loop().time()
-                self._latest[name] = status[name]
-        self._broadcast(payload)
-
-    def crashed(self) -> bool:
-        """Notes a crash; True when there were too many of late."""
-        now = asyncio.get_running_loop().time()
-        self._crashes.append(now)
-        return len(self._crashes) == CRASHES and now - self._crashes[0] < CRASH_SECONDS
-
-
 class Sessions:
     """All sessions: bounded in number and in idle time."""
 
@@ -178,6 +34,7 @@ class Sessions:
         self._settings, self._supervisor = settings, supervisor
         self._sessions: dict[str, Session] = {}
         self._tasks = Tasks()
+        self._stopping = False
 
     def __len__(self) -> int:
         return len(self._sessions)
@@ -186,26 +43,38 @@ class Sessions:
         self._tasks.spawn(self._reap())
 
     async def stop(self) -> None:
+        """Ends all sessions, and waits until their viewers have heard it, but not for long."""
+        self._stopping = True
         self._tasks.cancel()
-        for session in tuple(self._sessions.values()):
-            self._close(session, "ended", "The server stops.")
+        sessions = tuple(self._sessions.values())
+        for session in sessions:
+            self._close(session, "recovering", STOPPED)
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(LAST_WORDS):
+                while any(session.viewers for session in sessions):
+                    await asyncio.sleep(0.01)
 
     async def create(self, entry: Entry, new: NewSession) -> Session:
         """A new session. Raises SessionsFull, ParameterError."""
-        Params = entry.lab.Params
-        params = Params().change(Params.read(new.link) | new.params)
+        # Texts are read by the lab's own code: not on the event loop.
+        params, seed, remarks = await asyncio.to_thread(_read, entry.lab.Params(), new)
+        if self._stopping:
+            raise Unavailable(STOPS)
         if len(self) >= self._settings.max_sessions:
             raise SessionsFull(
                 f"all {self._settings.max_sessions} places are taken: close another lab's page, "
                 "or wait until one falls idle"
             )
-        session = Session(entry, params, new)
+        session = Session(entry, params, seed, new.view, remarks, self._supervisor.clock)
         self._sessions[session.id] = session
         try:
             await session.open(self._supervisor)
-        except WorkerGone as error:
+        except BaseException as error:
+            # Whatever it was: a session that never lived takes no place.
             self._close(session, "failed", str(error))
-            raise Unavailable(f"the lab could not be opened ({error}): try again") from None
+            if isinstance(error, WorkerGone):
+                raise Unavailable(f"the lab could not be opened ({error}): try again") from None
+            raise
         if session.id not in self._sessions:
             self._close(session, "ended", "")
             raise Unavailable("the session was closed before it opened: open the lab anew")
@@ -217,6 +86,8 @@ class Sessions:
         try:
             return self._sessions[session_id]
         except KeyError:
+            if self._stopping:
+                raise Unavailable(STOPS) from None
             raise NoSession(
                 "no session has this id: it ended, or the server was restarted; open the lab anew"
             ) from None
@@ -274,7 +145,7 @@ class Sessions:
         settings = self._settings
         while True:
             await asyncio.sleep(min(1.0, settings.viewerless_seconds / 2))
-            now = asyncio.get_running_loop().time()
+            now = self._supervisor.clock.now
             for session in tuple(self._sessions.values()):
                 if session.state == "starting":
                     session.watched = now  # its first worker may take a minute
@@ -288,3 +159,9 @@ class Sessions:
                         f"Nobody touched this lab for {minutes:.0f} minutes, so it made room for "
                         "others. Reload the page to go on with the same parameters.",
                     )
+
+
+def _read(defaults: Params, new: NewSession) -> tuple[Params, int, list[str]]:
+    """Parameters, seed, and remarks on the link. Raises ParameterError."""
+    params, seed, remarks = read_link(defaults, new.link)
+    return params.change(new.params), new.seed if seed is None else seed, remarks

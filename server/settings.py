@@ -1,9 +1,24 @@
 """What can be configured, by environment variables `ORCLAB_*`. All bounds have safe defaults."""
 
+import re
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
+
+
+def _origin(text: str) -> str:
+    if not re.fullmatch(r"https?://([\w.-]+|\[[0-9a-f:]+\])(:\d{1,5})?", text, re.IGNORECASE):
+        raise ValueError("an origin is http or https of a host, with its port where there is one")
+    return text.lower()
+
+
+def _root_path(text: str) -> str:
+    path = text.rstrip("/")
+    if not re.fullmatch(r"(/[\w.~%@+-]+)*", path):
+        raise ValueError("a path begins with a slash: /user/student/proxy/8301")
+    return path
+
 
 Seconds = Annotated[float, Field(gt=0)]
 
@@ -27,7 +42,9 @@ class Settings(BaseSettings):
     """A worker silent for this long is taken for hung, and replaced."""
     max_body_bytes: Annotated[int, Field(ge=1024)] = 65536
     """A larger request body is refused."""
-    max_solution_bytes: Annotated[int, Field(ge=1024, le=2**28)] = 2**25
+    max_solution_bytes: Annotated[int, Field(ge=1024, le=2**26)] = 2**24
     """A larger file of a solution is refused."""
-    origins: tuple[str, ...] = ()
+    origins: tuple[Annotated[str, AfterValidator(_origin)], ...] = ()
     """Further origins (scheme://host:port) whose pages may connect, beside the server's own."""
+    root_path: Annotated[str, AfterValidator(_root_path)] = ""
+    """The path under which a proxy shows this server: /user/student/proxy/8301."""

@@ -16,7 +16,8 @@ from labs.errors import LabError
 from server.commands import Command, execute
 from server.messages import Answer, Changes, Message
 from server.problems import describe
-from server.sessions import NoSession, Session, Sessions
+from server.session import Session
+from server.sessions import NoSession, Sessions
 from server.viewers import Viewer
 
 SEND_SECONDS = 20.0
@@ -86,11 +87,12 @@ async def _receive(socket: WebSocket, session: Session, viewer: Viewer) -> None:
         if len(text) > limit:
             await socket.close(TOO_LARGE, f"a message may have {limit} characters at most")
             return
-        answer = await _answer(session, text)
+        answer = await answer_request(session, text)
         session.reply(viewer, answer.model_dump_json().encode())
 
 
-async def _answer(session: Session, text: str) -> Answer:
+async def answer_request(session: Session, text: str) -> Answer:
+    """Does what a message asks for, whatever it is."""
     try:
         request = _request.validate_json(text)
     except ValidationError as error:

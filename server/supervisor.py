@@ -2,24 +2,30 @@
 
 import asyncio
 import contextlib
-import multiprocessing
-import os
+import logging
 import signal
 import socket
 import threading
 from collections.abc import Callable
+from multiprocessing.process import BaseProcess
 from typing import Any
 
 import orjson
 
 from labs.errors import LabError
-from server import worker_entry
+from server import fork_server, worker_entry
 from server.pipe import CONTROL, HEADER, encode, frame
 from server.settings import Settings
 from server.tasks import Tasks
+from server.waking_clock import WakingClock
+
+log = logging.getLogger("orclab.supervisor")
 
 REQUEST_SECONDS = 10.0
 SPAWN_SECONDS = 60.0
+RETRY_SECONDS = 1.0
+"""Until a spare is tried again that could not be had."""
+REFUSALS, REFUSAL_SECONDS = 10, 0.5
 
 Frames = Callable[[int, bytes], None]
 Gone = Callable[[str], None]
@@ -32,7 +38,7 @@ class WorkerGone(Exception):
 class Worker:
     """One worker process as the web process sees it."""
 
-    def __init__(self, process: Any, sock: socket.socket) -> None:
+    def __init__(self, process: Any, sock: socket.socket, clock: WakingClock) -> None:
         self.process = process
         self.port = 0
         """Of its Viser server, on loopback."""
@@ -44,7 +50,9 @@ class Worker:
         self._answers: dict[int, asyncio.Future[Any]] = {}
         self._references = 0
         self._ready = asyncio.get_running_loop().create_future()
-        self._heard = asyncio.get_running_loop().time()
+        self._writer: asyncio.StreamWriter | None = None
+        self._clock = clock
+        self._heard = clock.now
 
     async def wait_until_ready(self) -> None:
         """Waits until the worker has said that it is ready."""
@@ -61,11 +69,11 @@ class Worker:
         does not answer in time."""
         return await self._answer(do, self._expect(), arguments)
 
-    async def ask_for_file(self, do: str, form: str, path: str) -> None:
-        """Waits until the worker has written an export or a solution. Raises as `ask` does."""
+    async def ask_for_file(self, do: str, **arguments: Any) -> None:
+        """Waits until the worker has written a file. Raises as `ask` does."""
         done = self._expect()
         try:
-            await self.ask(do, form=form, path=path, done=done)
+            await self.ask(do, done=done, **arguments)
             await self._await(done)
         finally:
             self._answers.pop(done, None)
@@ -73,7 +81,7 @@ class Worker:
     @property
     def silence(self) -> float:
         """[s] since the loop was last heard."""
-        return asyncio.get_running_loop().time() - self._heard
+        return self._clock.now - self._heard
 
     async def end(self, reason: str) -> None:
         """Terminates, then kills."""
@@ -102,7 +110,7 @@ class Worker:
             self._answers.pop(reference, None)
 
     def _write(self, message: dict[str, Any]) -> None:
-        if self.gone:
+        if self.gone or not self._writer:
             raise WorkerGone(self.gone)
         self._writer.write(frame(CONTROL, encode(message)))
 
@@ -111,7 +119,7 @@ class Worker:
             while True:
                 size, kind = HEADER.unpack(await self._reader.readexactly(HEADER.size))
                 payload = await self._reader.readexactly(size)
-                self._heard = asyncio.get_running_loop().time()
+                self._heard = self._clock.now
                 if kind == CONTROL:
                     self._control(orjson.loads(payload))
                 else:
@@ -134,7 +142,7 @@ class Worker:
         if self.gone:
             return
         self.gone = reason
-        self._writer.close()
+        (self._writer or self._socket).close()
         for answer in self._answers.values():
             if not answer.done():
                 answer.set_exception(WorkerGone(reason))
@@ -148,13 +156,11 @@ class Supervisor:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        # Inherited by the fork server: threads hurt at these sizes.
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-        self._context = multiprocessing.get_context("forkserver")
-        self._context.set_forkserver_preload(["server.preload"])
+        self._context = fork_server.context()
         self._spares: list[Worker] = []
         self._workers: set[Worker] = set()
         self._tasks = Tasks()
+        self.clock = WakingClock()
         self._filling = asyncio.Lock()
         self.preparing = True
         """Whether the first worker is still awaited, while all is loaded and compiled."""
@@ -194,38 +200,62 @@ class Supervisor:
         self._workers.discard(worker)
 
     async def _spawn(self) -> Worker:
-        ours, theirs = socket.socketpair()
-        process = self._context.Process(
-            target=worker_entry.main, args=(theirs,), daemon=True, name="orclab-worker"
-        )
         try:
-            # The first waits here until the fork server has prepared what all workers share. That
-            # may take a minute, where solvers are to be compiled; nobody is late yet.
-            await _on_a_thread(process.start)
-        except (EOFError, OSError) as error:
-            ours.close()
-            raise WorkerGone(f"no process could be started ({error!r})") from None
-        finally:
-            theirs.close()
-        worker = Worker(process, ours)
+            worker = await self._start()
+        except (EOFError, OSError, RuntimeError) as error:
+            why = getattr(error, "strerror", None) or repr(error)
+            raise WorkerGone(f"no process could be started: {why}") from None
         self._workers.add(worker)
         try:
             await worker.wait_until_ready()
-        except (WorkerGone, TimeoutError) as error:
+        except (WorkerGone, TimeoutError, OSError) as error:
             await self.release(worker, "it did not start")
             raise WorkerGone(f"a worker did not start: {error}") from None
         self.preparing = False
         return worker
 
+    async def _start(self) -> Worker:
+        """A process that begins. Raises OSError (of descriptors, processes), EOFError."""
+        ours, theirs = socket.socketpair()
+        try:
+            process = self._context.Process(
+                target=worker_entry.main, args=(theirs,), daemon=True, name="orclab-worker"
+            )
+            # The first waits here until the fork server has prepared what all workers share. That
+            # may take a minute, where solvers are to be compiled; nobody is late yet.
+            await self._begin(process)
+        except BaseException:
+            ours.close()
+            raise
+        finally:
+            theirs.close()
+        return Worker(process, ours, self.clock)
+
+    async def _begin(self, process: BaseProcess) -> None:
+        """A fork server that ends, as it does when a request of it was broken off, refuses others
+        until it is gone; then `start` begins another."""
+        for _ in range(REFUSALS):
+            with contextlib.suppress(ConnectionError, EOFError):
+                return await _on_a_thread(process.start)
+            await asyncio.sleep(REFUSAL_SECONDS)
+        await _on_a_thread(process.start)
+
     async def _fill(self) -> None:
         async with self._filling:
             self._spares = [w for w in self._spares if not w.gone]
+            told = False
             while len(self._spares) < self._settings.spares:
-                self._spares.append(await self._spawn())
+                try:
+                    self._spares.append(await self._spawn())
+                except WorkerGone as error:
+                    if not told:
+                        log.warning("no spare worker: %s", error)
+                    told = True
+                    await asyncio.sleep(RETRY_SECONDS)
 
     async def _watch(self) -> None:
         while True:
-            await asyncio.sleep(0.25)
+            await self.clock.tick()
             for worker in tuple(self._workers):
                 if worker.gone:
                     self._workers.discard(worker)

@@ -3,6 +3,7 @@
 
 import { plain } from "./format.js";
 import { positionOf, stepped, valueAt } from "./scales.js";
+import { wireTextFile } from "./text_file.js";
 
 const KEYS = { ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1, PageUp: 10, PageDown: -10 };
 
@@ -21,6 +22,11 @@ export class KnobRow {
     if (tunable.kind === "knob") this.field.addEventListener("focus", () => this.field.select());
     if (this.typed) this.field.addEventListener("keydown", (event) => this.onKey(event));
     if (this.track) this.wireTrack();
+    const take = (text) => {
+      this.field.value = text; // what is wrong with it is put right there
+      knobs.commit(tunable.name, text, this);
+    };
+    if (tunable.kind === "text") wireTextFile(element, this.field, take, (sentence) => this.mark(sentence));
   }
 
   wireTrack() {
@@ -119,7 +125,7 @@ export class KnobRow {
 }
 
 // The same as `Knob.unit_under`.
-function unitUnder({ unit, units }, values) {
+export function unitUnder({ unit, units }, values) {
   const found = Object.entries(units).map(([name, own]) => own[values[name]]);
   return found.find((own) => own !== undefined) ?? unit;
 }

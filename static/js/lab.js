@@ -2,6 +2,8 @@
 
 import { describeScene } from "./describe.js";
 import { Experiments } from "./experiments.js";
+import { printFigures } from "./figures/printing.js";
+import { Saving } from "./figures/saving.js";
 import { wireKeyboard } from "./keyboard.js";
 import { KnobColumn } from "./knob_column.js";
 import { Knobs } from "./knobs.js";
@@ -9,6 +11,7 @@ import { linkOf, readLink, writeLink } from "./link.js";
 import { wireMenus } from "./menus.js";
 import { Board } from "./plots/board.js";
 import { onViewChange, view, wirePreferences } from "./preferences.js";
+import { ROOT } from "./root.js";
 import { Session } from "./session.js";
 import { SolverRow } from "./solver.js";
 import { Sheets } from "./sheet.js";
@@ -30,6 +33,8 @@ const column = new KnobColumn(lab, knobs);
 const symbols = new Symbols(lab, knobs);
 const experiments = new Experiments(lab, apply, board, (names) => column.highlight(names));
 let link = location.href;
+new Saving(board, aboutFigure, () => session.info?.id);
+printFigures(() => board.shelf.shown, aboutFigure);
 
 // A command whose refusal is said at the bottom of the page. Tells whether it was done.
 async function send(command) {
@@ -66,8 +71,15 @@ const actions = {
   experiment: (i) => experiments.start(i),
 };
 
+// What a figure says beneath its plots.
+function aboutFigure() {
+  const iteration = solver.status?.iteration;
+  const address = new URL(link, location.href).href;
+  return { lab, params: knobs.values, seed: session.want.seed, t: board.time, iteration, link: address };
+}
+
 async function copyCommand() {
-  const response = await fetch(`/api/sessions/${session.info?.id}/command`).catch(() => null);
+  const response = await fetch(`${ROOT}api/sessions/${session.info?.id}/command`).catch(() => null);
   const data = await response?.json().catch(() => null);
   if (data?.command) copy(data.command, `Copied: ${data.command}`);
   else toast(data?.error ?? "The server does not answer.");
@@ -86,7 +98,7 @@ async function copy(text, done) {
 function download(what) {
   if (!session.info) return;
   const anchor = document.createElement("a");
-  anchor.href = `/api/sessions/${session.info.id}/${what}`;
+  anchor.href = `${ROOT}api/sessions/${session.info.id}/${what}`;
   anchor.download = "";
   anchor.click();
 }
@@ -130,6 +142,10 @@ session.addEventListener("preparing", () => stage.prepare());
 session.addEventListener("refused", ({ detail }) => {
   const sentence = detail.replace(/\.?$/, ".");
   toast(`The link was not taken: ${sentence} The lab starts with its defaults.`, 15);
+});
+
+session.addEventListener("remarks", ({ detail }) => {
+  toast(`Of the link: ${detail.slice(0, 4).join(". ")}. All else of it holds.`, 15);
 });
 
 session.addEventListener("compared", ({ detail }) => board.compare(detail));

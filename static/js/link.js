@@ -1,12 +1,13 @@
 // The page's address encodes what is on screen: every parameter that differs from its default,
 // and the seed. Opened elsewhere, it shows the same.
 
+const MOST = 100; // texts, and letters of a name, that the server takes
+const LONGEST = 64;
+
 // The server knows what the texts mean, and says what is wrong with them.
 export function readLink() {
-  const { seed = "", ...link } = Object.fromEntries(new URLSearchParams(location.search));
-  const number = Number(seed);
-  const valid = Number.isInteger(number) && number >= 0 && number <= 0xffffffff;
-  return { link, seed: valid ? number : 0 };
+  const texts = [...new URLSearchParams(location.search)].slice(0, MOST);
+  return Object.fromEntries(texts.map(([name, text]) => [name.slice(0, LONGEST), text]));
 }
 
 export function linkOf(tunables, params, seed) {

@@ -1,12 +1,20 @@
-// Menus are native popovers; this only puts each beside its button and closes it after a choice.
+// Menus are native popovers; this only puts each beside the button that opens it and closes it after
+// a choice.
 
 const GAP = 6;
 
 export function wireMenus() {
+  const openers = new Map(); // by the menu's id: the button pressed last
+  const opens = "[popovertarget]";
+  document.addEventListener("click", ({ target }) => {
+    const button = target.closest?.(opens);
+    if (button) openers.set(button.getAttribute("popovertarget"), button);
+  }, true);
+  for (const button of document.querySelectorAll(opens)) button.setAttribute("aria-expanded", "false");
   for (const menu of document.querySelectorAll(".menu[popover]")) {
-    const button = document.querySelector(`[popovertarget="${menu.id}"]`);
-    button.setAttribute("aria-expanded", "false");
     menu.addEventListener("toggle", (event) => {
+      const button = openers.get(menu.id);
+      if (!button) return;
       button.setAttribute("aria-expanded", String(event.newState === "open"));
       if (event.newState === "open") place(menu, button);
     });

@@ -1,8 +1,10 @@
 // One live session of a lab, from this page's side: creates it, listens to its stream, and brings
 // it back with the same parameters when the connection, the worker or the whole server was lost.
 //
-// Events: "phase" {phase, text}, "preparing", "hello", "telemetry", "status", "notice", "refused" (a sentence).
+// Events: "phase" {phase, text}, "preparing", "hello", "telemetry", "status", "notice", "refused" (a sentence), "remarks" (sentences).
 // Phases: worker, robot, live, lost, full, failed, ended.
+
+import { ROOT } from "./root.js";
 
 const BACKOFF = [500, 1000, 2000, 3500, 5000]; // [ms]
 const FULL_RETRY = 10000;
@@ -12,12 +14,12 @@ const PATIENCE_FOR_ANSWER = 15000; // A worker is given ten seconds.
 const SILENCE = 8000; // A live stream speaks twice a second; after this it is taken for dead.
 
 export class Session extends EventTarget {
-  constructor(lab, frame, { link, seed }, view) {
+  constructor(lab, frame, link, view) {
     super();
     this.lab = lab;
     this.frame = frame;
     this.view = view; // a function: what the scene should look like now
-    this.want = { params: {}, link, seed, speed: 1, running: null, solver: null };
+    this.want = { params: {}, link, seed: 0, speed: 1, running: null, solver: null };
     this.info = null;
     this.socket = null;
     this.tries = 0;
@@ -49,7 +51,7 @@ export class Session extends EventTarget {
     this.emit("phase", { phase: "worker", text: news });
     const { params, link, seed } = this.want;
     const waiting = setInterval(() => this.reportPreparing(), PATIENCE);
-    const { status, data } = await request("POST", "/api/sessions", {
+    const { status, data } = await request("POST", "api/sessions", {
       lab: this.lab.slug, params, link, seed, view: this.view(),
     });
     clearInterval(waiting);
@@ -72,7 +74,7 @@ export class Session extends EventTarget {
 
   // A server started for the first time has more to do than to start a worker.
   async reportPreparing() {
-    const { data } = await request("GET", "/healthz");
+    const { data } = await request("GET", "healthz");
     if (data.preparing && !this.info && !this.closed) this.emit("preparing");
   }
 
@@ -81,19 +83,20 @@ export class Session extends EventTarget {
     this.worker = null;
     this.tries = 0;
     this.emit("phase", { phase: "robot", text: "" });
+    if (info.remarks.length) this.emit("remarks", info.remarks);
     this.showScene();
     this.listen();
   }
 
   showScene() {
-    const address = `${this.info.scene}?hideViserLogo${this.view().dark ? "&darkMode" : ""}`;
+    const address = `${ROOT}${this.info.scene.slice(1)}?hideViserLogo${this.view().dark ? "&darkMode" : ""}`;
     // Replacing leaves no entry behind in the browser's history.
     if (this.frame.src) this.frame.contentWindow.location.replace(address);
     else this.frame.src = address;
   }
 
   listen() {
-    const socket = new WebSocket(location.origin.replace(/^http/, "ws") + this.info.stream);
+    const socket = new WebSocket(location.origin.replace(/^http/, "ws") + ROOT + this.info.stream.slice(1));
     this.socket = socket;
     this.heard = performance.now();
     socket.onmessage = (event) => {
@@ -155,7 +158,7 @@ export class Session extends EventTarget {
     if (this.closed) return;
     this.statusReceived = this.live = false;
     this.emit("phase", { phase: "lost", text: "The connection was lost. Trying again …" });
-    const { status } = await request("GET", `/api/sessions/${this.info.id}`);
+    const { status } = await request("GET", `api/sessions/${this.info.id}`);
     if (this.closed || this.socket) return;
     if (status === 200 && this.tries < 1) {
       this.tries += 1;
@@ -212,7 +215,7 @@ export class Session extends EventTarget {
   end() {
     const { id } = this.info ?? {};
     this.info = null;
-    if (id) fetch(`/api/sessions/${id}`, { method: "DELETE", keepalive: true }).catch(() => {});
+    if (id) fetch(`${ROOT}api/sessions/${id}`, { method: "DELETE", keepalive: true }).catch(() => {});
   }
 
   // Commands and changes. Both throw an Error with the server's sentence.
@@ -259,7 +262,7 @@ export class Session extends EventTarget {
   // A saved solution, as the file it is: too large for the stream.
   async load(file) {
     if (!this.info) throw new Error("The simulation is not ready yet.");
-    const { status, data } = await request("PUT", `/api/sessions/${this.info.id}/solution`, file);
+    const { status, data } = await request("PUT", `api/sessions/${this.info.id}/solution`, file);
     if (status >= 200 && status < 300) return;
     if (status === 404) this.retryNow();
     throw new Error(data.error);
@@ -274,7 +277,7 @@ export class Session extends EventTarget {
 async function request(method, address, body) {
   const asIs = body === undefined || body instanceof Blob;
   try {
-    const response = await fetch(address, {
+    const response = await fetch(ROOT + address, {
       method,
       headers: asIs ? {} : { "Content-Type": "application/json" },
       body: asIs ? body : JSON.stringify(body),

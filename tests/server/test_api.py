@@ -5,6 +5,7 @@ import json
 import math
 from typing import Any
 
+import httpx
 import numpy as np
 import pytest
 from websockets.exceptions import ConnectionClosed
@@ -124,6 +125,38 @@ def test_an_experiment_is_one_command(served: Served) -> None:
         assert session.command("apply", hold=-1.0).status_code == 422
 
 
+def test_a_link_keeps_what_it_can(served: Served) -> None:
+    link = {"gain": "1e9", "omega": "3", "fbclid": "x", "seed": "5"}
+    with served.session("oscillator", link=link) as session:
+        params, remarks = session.info["params"], session.info["remarks"]
+        assert (params["gain"], params["omega"], session.info["seed"]) == (1000.0, 3.0, 5)
+        assert [remark.split()[0] for remark in remarks] == ["fbclid", "gain"]
+
+
+def test_plots_are_files(served: Served) -> None:
+    """As labs/engine/plot_data.py makes them; here is how they are asked for."""
+    with served.session("oscillator", seed=5) as session:
+        session.command("pause")
+
+        def plots(form: str, **query: str) -> httpx.Response:
+            return served.http.get(f"{session.path}/plots.{form}", params=query)
+
+        table = plots("csv", title="Position")
+        assert "oscillator-position.csv" in table.headers["content-disposition"]
+        one, every = plots("json", title="Position").json(), plots("json").json()
+        assert (one["seed"], one["t"]) == (5, every["t"])
+        assert one["plots"][0] in every["plots"]
+        rows = [line.split(",") for line in table.text.splitlines()[1:]]
+        assert [float(row[1]) for row in rows] == one["plots"][0]["data"]["x"]
+        assert plots("zip").content.startswith(b"PK")
+        for refused, why in (
+            (plots("csv"), "a table is of one plot"),
+            (plots("csv", title="No"), "there are Position, "),
+        ):
+            assert (refused.status_code, why in refused.json()["error"]) == (422, True)
+        assert plots("npz").status_code in (404, 422)
+
+
 def test_an_answer_comes_after_what_it_answers(served: Served) -> None:
     """Whoever has the answer to a command finds the session changed."""
     with served.session("oscillator") as session:
@@ -169,8 +202,7 @@ def test_exports_hold_the_same_run(served: Served) -> None:
     assert "oscillator.csv" in as_csv.headers["content-disposition"]
     x = np.array(as_json["channels"]["x"])
     assert len(x) == as_json["covers"]["rows"] >= 251
-    comment, header, *lines = as_csv.text.splitlines()
-    assert json.loads(comment[2:])["params"] == as_json["params"]
+    header, *lines = as_csv.text.splitlines()
     column = header.split(",").index("x")
     assert [float(line.split(",")[column]) for line in lines] == x.tolist()
     arrays = np.load(io.BytesIO(as_npz.content))

@@ -10,6 +10,7 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
+from scipy.linalg import solve_discrete_are
 
 from labs.engine.catalog import find
 from labs.engine.events import events_of
@@ -361,7 +362,7 @@ def test_a_refused_solution_leaves_the_session_as_it_was(served: Served) -> None
 def test_a_solution_may_be_larger_than_other_bodies_but_not_any_size(served: Served) -> None:
     with served.session("oscillator") as session:
         assert put(session, b" " * 100_000).status_code == 422
-        assert put(session, b" " * (2**25 + 1)).status_code == 413
+        assert put(session, b" " * (2**24 + 1)).status_code == 413
         parts = (b" " * 2**20 for _ in range(40))  # without a length
         assert put(session, parts).status_code == 413  # type: ignore[arg-type]
 
@@ -414,3 +415,37 @@ def test_wrong_use_of_the_command_is_refused(
     monkeypatch.chdir(tmp_path)
     assert main(["run", *arguments]) == 2
     assert sentence in capsys.readouterr().err
+
+
+def test_a_solution_tells_other_programs_what_was_found(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """An LQR's matrices and poles, a learner's curves, values and policy; and they do no harm to
+    who takes the solution up again."""
+    lqr, learned, plots = tmp_path / "lqr.npz", tmp_path / "td.json", tmp_path / "plots.json"
+    once = ["--seconds", "0", "--at", "0", "iterate=1"]
+    written = ["--solution-out", str(lqr), "--plots-out", str(plots)]
+    assert main(["run", "lqr", *once, *written]) == 0
+    with np.load(lqr) as file:
+        found = {n.removeprefix("results/"): file[n] for n in file if n.startswith("results/")}
+    a, b, q, r = (found[name] for name in "ABQR")
+    p, k = found["P"][0], found["K"][0]
+    np.testing.assert_allclose(p, solve_discrete_are(a, b, q, r), rtol=1e-6)
+    np.testing.assert_allclose(k, -np.linalg.solve(r + b.T @ p @ b, b.T @ p @ a), rtol=1e-6)
+    np.testing.assert_allclose(
+        np.sort_complex(found["poles"]), np.sort_complex(np.linalg.eigvals(a + b @ k)), rtol=1e-9
+    )
+    assert np.abs(found["poles"]).max() < 1.0 < np.abs(found["poles_open"]).max()
+    assert Solution.read(lqr.read_bytes()).results == {}
+    assert "Gain now" in {plot["title"] for plot in json.loads(plots.read_bytes())["plots"]}
+    assert main(["run", "lqr", "--solution", str(lqr), *once]) == 0
+    few = ["--set", "episodes=250", "--seconds", "0"]
+    assert main(["run", "td-control", *few, "--solution-out", str(learned)]) == 0
+    results = json.loads(learned.read_bytes())["results"]
+    assert {"V", "greedy_control", "policy", "online_first"} <= set(results)
+    values = np.reshape(results["V"]["values"], results["V"]["shape"])
+    data = json.loads(learned.read_bytes())["data"]
+    np.testing.assert_array_equal(
+        values, np.reshape(data["q"]["values"], data["q"]["shape"]).min(axis=-1)
+    )
+    capsys.readouterr()

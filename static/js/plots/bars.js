@@ -2,9 +2,10 @@
 
 import { number } from "../format.js";
 import { card } from "./card.js";
-import { around, Chart } from "./chart.js";
+import { Chart } from "./chart.js";
 import { sentences } from "./summary.js";
 import { symbol } from "./symbol.js";
+import { around } from "./ticks.js";
 
 export class Bars {
   constructor(plot) {
@@ -24,12 +25,15 @@ export class Bars {
   }
 
   draw() {
-    if (!this.values || !this.body.clientWidth) return;
+    if (this.body.clientWidth) this.paint(this.chart);
+  }
+
+  paint(chart) {
+    if (!this.values) return;
     const n = this.values.length;
     const wanted = around([...this.values, ...this.limits, ...this.limits.map((v) => -v), ...this.marks], { zero: true });
     const fits = this.y && this.y[0] <= wanted[0] && this.y[1] >= wanted[1];
     if (!fits || this.y[1] - this.y[0] > 3 * (wanted[1] - wanted[0])) this.y = wanted;
-    const chart = this.chart;
     chart.begin([0.4, n + 0.6], this.y, { xTicks: n > 30 ? null : this.values.map((_, i) => i + 1), xNames: this.names });
     this.values.forEach((value, i) => {
       if (!Number.isFinite(value)) return;

@@ -4,14 +4,14 @@ import { thin } from "../history.js";
 import { colour } from "./palette.js";
 
 // The stacked curves shown, each with where it begins and ends at every sample: positive
-// values upward from zero, negative ones downward.
-export function* areas(plot, u) {
-  if (!plot.plot.stacked || !u.data) return;
-  const up = new Float64Array(u.data[0].length);
-  const down = new Float64Array(u.data[0].length);
+// values upward from zero, negative ones downward. `data` is the times, and each curve's values.
+export function* areas(plot, data) {
+  if (!plot.plot.stacked || !data) return;
+  const up = new Float64Array(data[0].length);
+  const down = new Float64Array(data[0].length);
   for (const [i, curve] of plot.curves.entries()) {
-    if (!plot.isArea(curve.line) || !u.series[i + 1].show) continue;
-    const samples = Float64Array.from(u.data[i + 1]);
+    if (!plot.isArea(curve.line) || !plot.shows(curve)) continue;
+    const samples = Float64Array.from(data[i + 1]);
     const from = samples.map((value, k) => (value >= 0 ? up[k] : down[k]));
     const to = samples.map((value, k) => from[k] + value);
     samples.forEach((value, k) => ((value >= 0 ? up : down)[k] = to[k]));
@@ -22,7 +22,7 @@ export function* areas(plot, u) {
 export function drawAreas(plot, u) {
   const ctx = clip(u, 0.6);
   const x = Array.from(u.data[0], (t) => u.valToPos(t, "x", true));
-  for (const { curve, from, to } of areas(plot, u)) {
+  for (const { curve, from, to } of areas(plot, u.data)) {
     ctx.fillStyle = colour(curve.tone);
     ctx.beginPath();
     to.forEach((value, k) => ctx.lineTo(x[k], u.valToPos(value, "y", true)));

@@ -45,7 +45,7 @@ export class Board {
     this.unzoomButton?.addEventListener("click", () => this.unzoom());
     const select = (this.windowMenu = document.getElementById("window"));
     select?.addEventListener("change", () => this.setWindow(Number(select.value)));
-    if (select) document.getElementById("tools").hidden = this.series.length === 0;
+    for (const tool of document.querySelectorAll("#tools .of-time")) tool.hidden = this.series.length === 0;
   }
 
   hello({ columns }) {
@@ -205,6 +205,11 @@ export class Board {
     if (of === "last") return values.at(-1);
     if (of === "peak") return values.reduce((most, v) => Math.max(most, Math.abs(v)), 0);
     return values.reduce((a, b) => Math[of](a, b));
+  }
+
+  // [s] of what is shown.
+  get time() {
+    return this.now?.[0] ?? this.run?.last ?? 0;
   }
 
   // The component chosen for plots whose components share this name: an index, or "all".

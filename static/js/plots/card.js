@@ -1,4 +1,7 @@
-// The frame every plot stands in: a title with its unit, a place for a legend, and a body.
+// The frame every plot stands in: a title with its unit, a place for a legend, the way to save it,
+// and a body.
+
+import { svg } from "./chart.js";
 
 export function card(title, unit = "", bodyClass = "canvas") {
   const section = element("section", "plot");
@@ -9,7 +12,14 @@ export function card(title, unit = "", bodyClass = "canvas") {
   const setUnit = (text) => (small.textContent = text ? ` [${text}]` : "");
   setUnit(unit);
   const legend = element("div", "legend");
-  header.append(heading, legend);
+  const save = element("button", "save");
+  save.type = "button";
+  save.title = "Save this plot: picture or data";
+  save.setAttribute("aria-label", `Save ${title}`);
+  save.setAttribute("popovertarget", "save-menu");
+  save.append(svg("svg", { class: "icon", viewBox: "0 0 20 20", "aria-hidden": "true" }));
+  save.firstChild.append(svg("path", { d: "M10 3v9.5M6.3 9 10 12.7 13.7 9M4 16.5h12" }));
+  header.append(heading, legend, save);
   const body = element("div", bodyClass);
   section.setAttribute("aria-label", title);
   if (bodyClass.startsWith("canvas") && !bodyClass.endsWith("note")) {
@@ -17,7 +27,7 @@ export function card(title, unit = "", bodyClass = "canvas") {
     body.setAttribute("aria-label", title);
   }
   section.append(header, body);
-  return { section, setUnit, legend, body };
+  return { section, setUnit, legend, body, save };
 }
 
 export function element(name, className = "", text = "") {

@@ -3,10 +3,11 @@
 
 import { number } from "../format.js";
 import { card, element } from "./card.js";
-import { around, Chart } from "./chart.js";
+import { Chart } from "./chart.js";
 import { fill } from "./labels.js";
 import { outline, placesAlong, swatch } from "./marks.js";
 import { extent, sentences } from "./summary.js";
+import { around } from "./ticks.js";
 
 const SERIES = 8;
 
@@ -22,6 +23,9 @@ export class Curves {
   update(fields) {
     this.xLabel = fill(this.plot.x_label, fields);
     this.yLabel = fill(this.plot.y_label, fields);
+    // A logarithm has no place for what is negative: the axis is then linear.
+    const negative = this.plot.traces.some(({ y }) => (fields[y] ?? []).flat().some((v) => v < 0));
+    this.logY = this.plot.log_y && !negative;
     this.curves = this.plot.traces.flatMap((trace) => this.expand(trace, fields));
     this.marked = new Set(this.curves.map(({ series }) => series).filter(Boolean)).size > 1;
     this.updateLegend();
@@ -30,7 +34,7 @@ export class Curves {
 
   // The curves of a trace, one a column where its y is (n, k); its x may be, too.
   expand(trace, fields) {
-    const { log_x: logX, log_y: logY } = this.plot;
+    const { logY, plot: { log_x: logX } } = this;
     const place = (v, log) => (log ? Math.log10(v) : v); // of what is not positive: not finite
     const xs = fields[trace.x] ?? [];
     const ys = fields[trace.y] ?? [];
@@ -86,9 +90,14 @@ export class Curves {
   }
 
   draw() {
-    if (!this.curves || !this.body.clientWidth) return;
-    const { guide, equal, log_x: logX, log_y: logY } = this.plot;
-    const { xLabel, yLabel } = this;
+    if (this.body.clientWidth) this.paint(this.chart);
+  }
+
+  // Draws what there is on a chart, of the page or of a figure.
+  paint(chart) {
+    if (!this.curves) return;
+    const { guide, equal, log_x: logX } = this.plot;
+    const { xLabel, yLabel, logY } = this;
     const shown = this.shown;
     const circle = guide === "unit-circle";
     const axis = guide === "imaginary-axis" || guide === "left-half-plane";
@@ -98,7 +107,6 @@ export class Curves {
     // Beside a guide the frame stands still while points wander within it.
     this.x = guide === "none" ? x : widened(this.x, x);
     this.y = guide === "none" ? y : widened(this.y, y);
-    const chart = this.chart;
     chart.begin(this.x, this.y, { square: equal || circle, xLabel, yLabel, logX, logY });
     const [x0, , y0, y1] = chart.ranges;
     if (guide === "left-half-plane") {
@@ -128,7 +136,7 @@ export class Curves {
 
   summary() {
     if (!this.curves) return "";
-    const value = (v) => (this.plot.log_y ? 10 ** v : v);
+    const value = (v) => (this.logY ? 10 ** v : v);
     const there = this.curves.filter(({ points }) => points.length);
     const parts = there.map(({ label, points }) =>
       `${label || "points"}: ${points.length} points, ${extent(points.map(([, y]) => value(y)))}`);

@@ -1,131 +1,157 @@
-// A field over a plane, on Plotly, which is large: it is loaded once such a plot comes into view.
+// A field over a plane in colours, with a scale beside it and arrows over it. Its cells are drawn on
+// a canvas beneath the chart; in a figure each is a rectangle.
 
-/* global Plotly */
-import { card } from "./card.js";
+import { number } from "../format.js";
+import { paintArrows } from "./arrows.js";
+import { card, element } from "./card.js";
+import { Chart } from "./chart.js";
 import { fill } from "./labels.js";
-import { colour } from "./palette.js";
 import { extent, sentences } from "./summary.js";
-
-const RIM = "#14171c";
-const EVERY = 250; // [ms] between redraws
+import { around, label, ticks } from "./ticks.js";
 
 // The colours of values in the scene too (labs/colors.py), from the least to the largest.
-const SEQUENTIAL = ["#2b2459", "#363d7d", "#3d589e", "#3477a0", "#35949d", "#56ad8f", "#82c381", "#bcd67c", "#f2e873"]
-  .map((tone, place, { length }) => [place / (length - 1), tone]);
-
-let loading = null;
-
-function load(address) {
-  loading ??= new Promise((resolve, reject) => {
-    const script = document.createElement("script");
-    script.src = address;
-    script.onload = resolve;
-    script.onerror = () => reject(new Error("The plotting library did not load."));
-    document.head.append(script);
-  });
-  return loading;
-}
+const SEQUENTIAL = ["#2b2459", "#363d7d", "#3d589e", "#3477a0", "#35949d", "#56ad8f", "#82c381", "#bcd67c", "#f2e873"];
+const STEPS = colours(256);
 
 export class HeatMap {
-  constructor(plot, board) {
+  constructor(plot) {
     this.plot = plot;
     Object.assign(this, card(plot.title, "", "canvas tall"));
-    this.drawnAt = 0;
-    new IntersectionObserver(async ([entry]) => {
-      this.visible = entry.isIntersecting;
-      if (!this.visible) return;
-      try {
-        await load(board.lab.vendor.plotly);
-        this.ready = true;
-        this.draw();
-      } catch (error) {
-        this.body.textContent = error.message;
-      }
-    }).observe(this.body);
-    new ResizeObserver(() => this.draw(true)).observe(this.body);
+    this.canvas = this.body.appendChild(element("canvas", "cells"));
+    this.chart = new Chart(this.body, () => this.draw());
+    this.box = this.body.appendChild(element("div", "reading-box"));
+    this.box.hidden = true;
+    this.body.addEventListener("pointermove", (event) => this.read(event));
+    this.body.addEventListener("pointerleave", () => (this.box.hidden = true));
   }
 
   update(fields) {
     const { x, y, z, arrows } = this.plot;
     if (!fields[z]) return;
-    this.data = { x: fields[x], y: fields[y], z: fields[z] };
-    this.arrows = arrows ? fields[arrows] : [];
+    this.data = { x: fields[x], y: fields[y], z: fields[z], arrows: arrows ? fields[arrows] : [] };
     this.labels = [this.plot.x_label, this.plot.y_label, this.plot.z_label].map((text) => fill(text, fields));
     this.draw();
   }
 
-  rebuild() {
-    this.draw(true);
-  }
-
-  draw(now = false) {
-    if (!this.ready || !this.visible || !this.data) return;
-    if (!now && performance.now() - this.drawnAt < EVERY) return;
-    this.drawnAt = performance.now();
-    const [xLabel, yLabel, zLabel] = this.labels;
-    const size = 0.75 * parseFloat(getComputedStyle(document.documentElement).fontSize);
-    const axis = (text) => ({ title: { text, standoff: 6 }, gridcolor: colour("grid"), zeroline: false, ticks: "" });
-    const trace = {
-      type: "heatmap", ...this.data, colorscale: SEQUENTIAL,
-      colorbar: { title: { text: zLabel }, thickness: 10, outlinewidth: 0 },
-    };
-    const layout = {
-      width: this.body.clientWidth, height: this.body.clientHeight,
-      margin: { l: 4.5 * size, r: size, t: 0.75 * size, b: 3.6 * size },
-      showlegend: false, paper_bgcolor: "transparent", plot_bgcolor: "transparent",
-      font: { family: "system-ui, sans-serif", size, color: colour("axis") },
-      xaxis: axis(xLabel), yaxis: { ...axis(yLabel), autorange: this.plot.downward ? "reversed" : true }, uirevision: "keep",
-    };
-    Plotly.react(this.body, [trace, ...this.arrowTraces()], layout, { displayModeBar: false, doubleClick: "reset" });
-  }
-
-  // The arrows, white with a dark rim: they stand out on every colour of the map. Each is as long as
-  // its neighbours leave room for; what leads nowhere is a dot.
-  arrowTraces() {
-    if (!this.arrows.length) return [];
+  draw() {
     const { clientWidth: width, clientHeight: height } = this.body;
-    const [stepX, stepY] = [0, 1].map((i) => spacing(this.arrows.map((arrow) => arrow[i])));
-    const lines = { x: [], y: [] };
-    for (const [x, y, right, up] of this.arrows) {
-      const [dx, dy] = [0.36 * stepX * right, 0.36 * stepY * up];
-      lines.x.push(x - dx, x + dx, null);
-      lines.y.push(y - dy, y + dy, null);
+    if (!width || !this.data) return;
+    const { canvas } = this;
+    [canvas.width, canvas.height] = [width * devicePixelRatio, height * devicePixelRatio];
+    const ctx = canvas.getContext("2d");
+    // Whole pixels: neighbours leave no seam between them.
+    const place = (v) => Math.round(v * devicePixelRatio);
+    this.paint(this.chart, ({ x, y, width, height, fill }) => {
+      ctx.fillStyle = fill;
+      ctx.fillRect(place(x), place(y), place(x + width) - place(x), place(y + height) - place(y));
+    });
+  }
+
+  // Without `cell` each stretch of one colour in a row becomes a rectangle.
+  paint(chart, cell = (box) => chart.add("rect", { ...box, "shape-rendering": "crispEdges" })) {
+    if (!this.data) return;
+    const { x, y, z, arrows } = this.data;
+    const [xEdges, yEdges] = [edges(x), edges(y)];
+    const ends = (all) => [Math.min(...all), Math.max(...all)];
+    const range = this.range(z);
+    const [xLabel, yLabel, zLabel] = this.labels;
+    const whole = [...x, ...y].every(Number.isInteger);
+    const scale = ticks(...range, chart.body.clientHeight / 48);
+    const { em } = chart.clear();
+    const right = (2.2 + 0.56 * Math.max(...scale.map((v) => label(v).length), 2) + (zLabel ? 1.6 : 0)) * em;
+    chart.begin(ends(xEdges), ends(yEdges), { xLabel, yLabel, downward: this.plot.downward, whole, right, grid: false });
+    z.forEach((row, i) => {
+      const [top, bottom] = [chart.y(yEdges[i]), chart.y(yEdges[i + 1])].sort((a, b) => a - b);
+      const tones = row.map((value) => tone(value, range));
+      for (let j = 0, k = 1; j < tones.length; j = k++) {
+        while (k < tones.length && tones[k] === tones[j]) k += 1;
+        const [left, end] = [chart.x(xEdges[j]), chart.x(xEdges[k])].sort((a, b) => a - b);
+        if (tones[j]) cell({ x: left, y: top, width: end - left, height: bottom - top, fill: tones[j] });
+      }
+    });
+    paintScale(chart, range, scale, zLabel);
+    paintArrows(chart, arrows);
+  }
+
+  // Of the values there are; a constant stands in its middle.
+  range(z) {
+    let [low, high] = [Infinity, -Infinity];
+    for (const value of z.flat()) {
+      if (!Number.isFinite(value)) continue;
+      if (value < low) low = value;
+      if (value > high) high = value;
     }
-    const extent = (values) => Math.abs(values.at(-1) - values[0]) || 1;
-    // In pixels, about: of the body, so much is the map's.
-    const [across, upward] = [(0.7 * width * stepX) / extent(this.data.x), (0.6 * height * stepY) / extent(this.data.y)];
-    const leads = this.arrows.map(([, , right, up]) => right !== 0 || up !== 0);
-    const room = Math.min(10, Math.max(6, 0.5 * Math.min(across, upward)));
-    const traced = { type: "scatter", hoverinfo: "skip", ...lines, mode: "lines" };
-    return [
-      { ...traced, line: { color: RIM, width: 3.5 } },
-      { ...traced, line: { color: "#ffffff", width: 1.75 } },
-      {
-        type: "scatter", hoverinfo: "skip", mode: "markers",
-        x: this.arrows.map((_, i) => lines.x[3 * i + 1]), y: this.arrows.map((_, i) => lines.y[3 * i + 1]),
-        marker: {
-          symbol: leads.map((yes) => (yes ? "arrow" : "circle")), size: leads.map((yes) => (yes ? room : 4)),
-          angle: this.arrows.map(([, , right, up]) => (180 / Math.PI) * Math.atan2(right * across, up * upward)),
-          color: "#ffffff", opacity: 1, line: { color: RIM, width: 0.75 },
-        },
-      },
-    ];
+    return high > low ? [low, high] : around(low <= high ? [low] : []);
+  }
+
+  // The value under the pointer.
+  read({ clientX, clientY }) {
+    const at = this.body.getBoundingClientRect();
+    const { left, top, width, height } = this.chart.area ?? {};
+    const [across, down] = [clientX - at.left - left, clientY - at.top - top];
+    const within = this.data && across >= 0 && across < width && down >= 0 && down < height;
+    this.box.hidden = !within;
+    if (!within) return;
+    const { x, y, z } = this.data;
+    const [x0, x1, y0, y1] = this.chart.ranges;
+    const [j, i] = [nearest(x, x0 + (across / width) * (x1 - x0)), nearest(y, y1 + (down / height) * (y0 - y1))];
+    const words = [`${this.labels[0]}: ${number(x[j], 4)}`, `${this.labels[1]}: ${number(y[i], 4)}`, `${this.labels[2]}: ${number(z[i][j], 4)}`];
+    this.box.replaceChildren(...words.map((text) => element("span", "", text)));
+    this.box.style.insetInline = across > width / 2 ? `${left + 4}px auto` : `auto ${at.width - left - width + 4}px`;
   }
 
   summary() {
     if (!this.data) return "";
     const [xLabel, yLabel, zLabel] = this.labels;
-    const { x, y, z } = this.data;
+    const { x, y, z, arrows } = this.data;
     const parts = [`${zLabel} ${extent(z.flat()).replace(/, last.*/, "")}`, `${x.length} columns and ${y.length} rows`];
-    if (this.plot.arrows) parts.push(`${this.arrows.length} arrows`);
+    if (this.plot.arrows) parts.push(`${arrows.length} arrows`);
     return sentences(`${this.plot.title}: a map over ${xLabel} and ${yLabel}`, parts);
   }
 
   clear() {}
 }
 
-// The least distance of two places that differ.
-function spacing(places) {
-  const sorted = [...new Set(places)].sort((a, b) => a - b);
-  return sorted.length > 1 ? Math.min(...sorted.slice(1).map((place, i) => place - sorted[i])) : 1;
+// The scale of colours, right of the area.
+function paintScale(chart, [low, high], scale, text) {
+  const { left, top, width, height } = chart.area;
+  const { em } = chart;
+  const bar = { x: left + width + 0.8 * em, width: 0.8 * em };
+  const place = (v) => top + (1 - (v - low) / (high - low)) * height;
+  const count = 64;
+  for (let k = 0; k < count; k++) {
+    const y = top + (k / count) * height;
+    const fill = STEPS[Math.round((1 - (k + 0.5) / count) * (STEPS.length - 1))];
+    chart.add("rect", { ...bar, y, height: height / count + (k < count - 1 ? 0.5 : 0), fill });
+  }
+  for (const v of scale) chart.text(bar.x + bar.width + 0.35 * em, place(v) + 0.35 * em, label(v), "start");
+  if (!text) return;
+  const [x, y] = [chart.body.clientWidth - 0.6 * em, top + height / 2];
+  chart.text(x, y, text, "middle").setAttribute("transform", `rotate(-90 ${x} ${y})`);
+}
+
+// Where cells end: midway between their middles, and as far beyond the outermost.
+function edges(middles) {
+  if (middles.length === 1) return [middles[0] - 0.5, middles[0] + 0.5];
+  const between = middles.slice(1).map((v, i) => (middles[i] + v) / 2);
+  return [2 * middles[0] - between[0], ...between, 2 * middles.at(-1) - between.at(-1)];
+}
+
+function nearest(values, wanted) {
+  return values.reduce((best, v, i) => (Math.abs(v - wanted) < Math.abs(values[best] - wanted) ? i : best), 0);
+}
+
+function tone(value, [low, high]) {
+  return Number.isFinite(value) ? STEPS[Math.round(((value - low) / (high - low)) * (STEPS.length - 1))] : "";
+}
+
+// So many steps from the first colour to the last, by way of all between.
+function colours(count) {
+  const parts = SEQUENTIAL.map((hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16)));
+  return Array.from({ length: count }, (_, k) => {
+    const place = (k / (count - 1)) * (parts.length - 1);
+    const at = Math.min(Math.floor(place), parts.length - 2);
+    const mixed = parts[at].map((a, c) => Math.round(a + (place - at) * (parts[at + 1][c] - a)));
+    return `#${mixed.map((v) => v.toString(16).padStart(2, "0")).join("")}`;
+  });
 }

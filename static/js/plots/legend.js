@@ -1,6 +1,7 @@
 // The legend of a time series: one entry a line with its value, or, of many components, lines and
 // colours apart. Its entries show and hide their curves.
 
+import { spoken } from "../figures/words.js";
 import { number } from "../format.js";
 import { element } from "./card.js";
 import { fill } from "./labels.js";
@@ -35,14 +36,17 @@ export class Legend {
       const style = plot.isArea(line) ? "area" : line.style;
       const mark = plot.marked && !several && style !== "area" ? series : 0;
       const button = this.entry(`l${l}`, style, several && style !== "limit" ? "axis" : tone, mark);
-      button.append(symbol(line.mathml, several ? null : c));
+      const math = button.appendChild(symbol(line.mathml, several ? null : c));
+      button.setAttribute("aria-label", spoken(math));
       if (!several) this.values.push([l, button.appendChild(element("output", "", "—"))]);
     }
     const { labels } = plot.board;
     for (let c = 0; several && c < plot.components; c++) {
       const series = (c % SERIES) + 1;
       const button = this.entry(`c${c}`, "part", `series-${series}`, series);
-      button.append(labels[plot.plot.select]?.[c] ?? String(c + 1));
+      const name = labels[plot.plot.select]?.[c] ?? String(c + 1);
+      button.append(name);
+      button.setAttribute("aria-label", `${plot.plot.select} ${name}`.trim());
       if (!plot.unit && plot.plot.unit) button.append(element("small", "", fill(plot.plot.unit, labels, c)));
     }
   }

@@ -18,6 +18,7 @@ export class Matrix {
     if (!rows) return;
     const cells = rows.map((row) => [row].flat());
     const largest = Math.max(...cells.flat().map((value) => Math.abs(value ?? 0)), 1e-9);
+    [this.cells, this.largest] = [cells, largest];
     const decimals = decimalsFor(largest);
     const shape = JSON.stringify([names, cells.length, cells[0]?.length]);
     if (shape !== this.shape) {
@@ -38,6 +39,42 @@ export class Matrix {
       if (cell.textContent !== text) cell.textContent = text;
       if (this.plot.shade) cell.style.backgroundColor = diverging((value ?? 0) / largest);
     }));
+  }
+
+  // The same as vectors, between the lines that a matrix has at its sides.
+  paint(chart) {
+    if (!this.cells) return;
+    const { width, em } = chart.clear();
+    const texts = [...this.table.rows].map((row) => [...row.cells].map((cell) => cell.textContent));
+    const named = this.table.rows[0].cells[0]?.localName === "th";
+    const high = (this.figureHeight() - 0.6 * em) / texts.length;
+    const longest = (column) => Math.max(...texts.map((row) => row[column].length));
+    const widths = texts[0].map((_, j) => (0.62 * longest(j) + 1) * em);
+    const shrink = Math.min(1, (width - 2 * em) / widths.reduce((a, b) => a + b));
+    let left = (width - shrink * widths.reduce((a, b) => a + b)) / 2;
+    const side = (x) => chart.add("line", { x1: x, x2: x, y1: 0.3 * em, y2: 0.3 * em + texts.length * high, class: "side" });
+    widths.forEach((full, j) => {
+      const wide = shrink * full;
+      if (j === Number(named)) side(left);
+      texts.forEach((row, i) => {
+        const y = 0.3 * em + i * high;
+        const level = named ? j - 1 : j;
+        if (this.plot.shade && level >= 0) {
+          const style = `fill: ${diverging((this.cells[i][level] ?? 0) / this.largest)}`;
+          chart.add("rect", { x: left + 0.5, y: y + 0.5, width: wide - 1, height: high - 1, style });
+        }
+        const text = chart.text(left + wide - 0.5 * shrink * em, y + high / 2 + 0.35 * em, row[j], "end");
+        text.setAttribute("class", named && !j ? "row-name" : "digits");
+        text.style.fontSize = `${shrink * em}px`;
+      });
+      left += wide;
+    });
+    side(left);
+  }
+
+  // [px] of it as vectors.
+  figureHeight() {
+    return this.table.rows.length * 22 + 8;
   }
 
   // What the style sheet needs to fit it into the card. A column never becomes narrower again while

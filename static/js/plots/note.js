@@ -1,5 +1,6 @@
 // What a lab says of its world, in sentences.
 
+import { wrapped } from "../figures/words.js";
 import { card, element } from "./card.js";
 
 export class Note {
@@ -14,6 +15,20 @@ export class Note {
     if (text === undefined || text === this.text) return;
     this.text = text;
     this.body.replaceChildren(...text.split("\n").map((line) => element("p", "", line)));
+  }
+
+  // In lines as wide as a figure.
+  paint(chart) {
+    const { width, em } = chart.clear();
+    wrapped(this.text ?? "", width - 2 * em).forEach((line, i) => {
+      chart.text(em, (1.2 + 1.5 * i) * em, line, "start").setAttribute("class", "sentence");
+    });
+  }
+
+  // [px] of it as vectors.
+  figureHeight(width) {
+    const em = 0.75 * parseFloat(getComputedStyle(document.documentElement).fontSize);
+    return (wrapped(this.text ?? "", width - 2 * em).length * 1.5 + 0.7) * em;
   }
 
   clear() {}

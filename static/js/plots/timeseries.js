@@ -1,6 +1,7 @@
 // Measured channels over time, on uPlot. Beneath them, faint, the same channels of the run before.
 
 /* global uPlot */
+import { spoken } from "../figures/words.js";
 import { number } from "../format.js";
 import { thin } from "../history.js";
 import { areas, drawAreas, drawGhost, ghostSamples } from "./beneath.js";
@@ -12,6 +13,7 @@ import { Legend } from "./legend.js";
 import { markCurves } from "./marking.js";
 import { DASHES } from "./marks.js";
 import { colour, SERIES } from "./palette.js";
+import { paintTimeSeries } from "./paint_time_series.js";
 import { extent, sentences } from "./summary.js";
 import { symbol } from "./symbol.js";
 
@@ -90,7 +92,7 @@ export class TimeSeries {
       },
       scales: {
         x: { time: false, auto: false, range: (u, low, high) => [low, high] },
-        y: { range: (u, low, high) => this.range(low, high, u) },
+        y: { range: (u, low, high) => this.range(low, high, u.data) },
       },
       axes: [
         { ...axis, size: 1.75 * rem(), gap: 4, space: 4 * rem(), values: (u, ticks) => ticks.map((t) => `${+t.toFixed(6)} s`) },
@@ -130,14 +132,9 @@ export class TimeSeries {
   draw() {
     const u = this.uplot;
     if (!u || !this.visible) return;
-    const run = this.board.run;
     const [from, to] = this.board.range();
-    const [a, b] = run.span(from, to);
-    const stride = Math.max(1, Math.floor((b - a) / (DENSITY * u.width)));
-    const data = ["t", ...this.curves.map((curve) => curve.column)].map((name) =>
-      holed(thin(run.column(name), a, b, stride)));
     u.batch(() => {
-      u.setData(data, false);
+      u.setData(this.samples(u.width).map(holed), false);
       u.setScale("x", { min: from, max: to });
     });
     // Under a resting pointer the samples move on.
@@ -146,12 +143,30 @@ export class TimeSeries {
     this.readOut(left >= 0);
   }
 
+  // The times in range and each curve's values then, as many as this width can show.
+  samples(width) {
+    const { run } = this.board;
+    const [a, b] = run.span(...this.board.range());
+    const stride = Math.max(1, Math.floor((b - a) / (DENSITY * width)));
+    return ["t", ...this.curves.map((curve) => curve.column)].map((name) => thin(run.column(name), a, b, stride));
+  }
+
+  // On the chart of a figure, where the page has uPlot's.
+  paint(chart) {
+    if (!this.uplot) {
+      this.choose();
+      this.setUnit(this.unit);
+      this.switches.write();
+    }
+    if (this.curves.length) paintTimeSeries(this, chart);
+  }
+
   // The y range: the curves and the ghost, and a limit once a curve comes near it. It grows at
   // once but shrinks only when much of it is empty, so that it does not tremble.
-  range(low, high, u) {
+  range(low, high, data) {
     const [from, to] = this.board.range();
     if (low === null || low === undefined) [low, high] = [Infinity, -Infinity];
-    for (const { from, to } of areas(this, u)) {
+    for (const { from, to } of areas(this, data)) {
       for (const value of [...from, ...to]) {
         if (value < low) low = value;
         if (value > high) high = value;
@@ -230,7 +245,7 @@ export class TimeSeries {
     const names = this.board.labels[this.plot.select];
     const parts = this.curves.map(({ line, c }, i) => {
       const which = this.components > 1 && c !== null ? `, ${this.plot.select} ${names?.[c] ?? c + 1}` : "";
-      return `${symbol(line.mathml).textContent}${which}: ${extent(all[i])} ${fill(this.plot.unit, this.board.labels, c)}`.trimEnd();
+      return `${spoken(symbol(line.mathml))}${which}: ${extent(all[i])} ${fill(this.plot.unit, this.board.labels, c)}`.trimEnd();
     });
     return sentences(`${this.plot.title} over time, ${number(t[0], 3)} s to ${number(t[t.length - 1], 3)} s`, parts);
   }

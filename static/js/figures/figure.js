@@ -1,0 +1,104 @@
+// Plots as one picture in vectors, on white: each with its title, unit and legend, beneath them the
+// lab, its parameters, the seed and the time. It is drawn out of sight, at a size of its own.
+
+import { short } from "../format.js";
+import { acts } from "../knob_column.js";
+import { unitUnder } from "../knob_row.js";
+import { element } from "../plots/card.js";
+import { Chart, svg } from "../plots/chart.js";
+import { symbol } from "../plots/symbol.js";
+import { entry, flow } from "./flow.js";
+import { freeze } from "./vectors.js";
+import { piecesOf } from "./words.js";
+
+const MARGIN = 18;
+const GAP = 20;
+const SIZES = [[760, 340], [560, 250]]; // [px] of a plot without its title, in one column or two
+const LONGEST = 40; // letters of a text in the caption
+
+// `about` is {lab, params, seed, t, iteration, link}. The element is a picture of its own.
+export function figure(plots, about, columns = Math.min(2, plots.length)) {
+  const host = document.body.appendChild(element("div", "figure-host"));
+  try {
+    const [width, height] = SIZES[columns - 1];
+    const whole = 2 * MARGIN + columns * width + (columns - 1) * GAP;
+    const root = host.appendChild(svg("svg", { xmlns: "http://www.w3.org/2000/svg", class: "figure" }));
+    root.append(svg("rect", { class: "paper", width: whole, height: 1 }));
+    const ends = Array(columns).fill(MARGIN); // of the columns so far: the next plot goes where most room is
+    for (const plot of plots) {
+      const k = ends.indexOf(Math.min(...ends));
+      ends[k] += panel(root, host, plot, [MARGIN + k * (width + GAP), ends[k]], [width, height]) + GAP;
+    }
+    let top = Math.max(...ends);
+    top += caption(root, about, [MARGIN, top - 0.5 * GAP], whole - 2 * MARGIN) - 0.5 * GAP + MARGIN;
+    const title = svg("title", {});
+    title.textContent = [about.lab.title, ...plots.map(({ plot }) => plot.title)].join(": ").replaceAll(/: (?=.*: )/g, ": ");
+    const link = svg("desc", {});
+    link.textContent = about.link;
+    root.prepend(title, link);
+    root.querySelector(".paper").setAttribute("height", top);
+    for (const [name, value] of Object.entries({ width: whole, height: top, viewBox: `0 0 ${whole} ${top}` })) root.setAttribute(name, value);
+    freeze(root);
+    return root;
+  } finally {
+    host.remove();
+  }
+}
+
+// One plot with its title and legend; tells how high it is.
+function panel(root, host, plot, [x, y], [width, standard]) {
+  const height = plot.figureHeight?.(width) ?? standard;
+  const body = host.appendChild(element("div"));
+  Object.assign(body.style, { width: `${width}px`, height: `${height}px` });
+  const chart = new Chart(body);
+  plot.paint(chart);
+  const heading = svg("text", { x, y: y + 12, class: "heading" });
+  heading.textContent = plot.plot.title;
+  const unit = plot.section.querySelector("h3 small").textContent;
+  const small = svg("tspan", { class: "unit" });
+  small.textContent = unit;
+  if (unit) heading.append(small);
+  root.append(heading);
+  const indent = heading.getComputedTextLength() + 24;
+  const used = flow(root, entriesOf(plot), [x, y], width, { indent, size: 12, right: true });
+  const inner = svg("g", { class: "chart", transform: `translate(${x} ${y + used + 6})` });
+  inner.append(...chart.svg.childNodes);
+  root.append(inner);
+  return used + 6 + height;
+}
+
+// What the legend shows: each a swatch, if it has one, and words.
+function entriesOf({ legend }) {
+  const said = [...legend.children].filter((one) => one.getAttribute("aria-pressed") !== "false");
+  return said.map((one) => {
+    if (one.localName === "math") return entry(piecesOf(one));
+    const words = [...one.childNodes].filter((node) => !["svg", "output"].includes(node.localName));
+    const pieces = words.flatMap((node) => (node.localName === "math" ? piecesOf(node) : [{ text: ` ${node.textContent}`, plain: true }]));
+    if (pieces[0]?.plain) pieces[0].text = pieces[0].text.trimStart();
+    return entry(pieces, one.querySelector("svg"));
+  });
+}
+
+// The lab, what its parameters are, and when; tells how high that is.
+function caption(root, { lab, params, seed, t, iteration }, [x, y], width) {
+  const plain = (text, tone = "") => entry([{ text, plain: true }], null, tone);
+  const where = [`${lab.title}, notes ${lab.section}`, lab.has_world ? `t = ${+t.toFixed(4)} s` : "", iteration ? `iteration ${iteration}` : "", `seed ${seed}`, `orclab ${lab.version}`];
+  const set = lab.params.filter((tunable) => tunable.name in params && acts(tunable, params));
+  const values = set.map((tunable) => {
+    const name = tunable.mathml ? piecesOf(symbol(tunable.mathml)) : [{ text: tunable.label || tunable.name, plain: true }];
+    const value = params[tunable.name];
+    const unit = tunable.kind === "knob" ? unitUnder(tunable, params) : "";
+    const text = ` = ${inWords(tunable, value)} ${unit}`.trimEnd();
+    return entry([...name, { text, plain: true }], null, value === tunable.default ? "muted" : "");
+  });
+  const first = flow(root, where.filter(Boolean).map((text) => plain(text)), [x, y], width, { size: 11 });
+  return first + flow(root, values, [x, y + first], width, { size: 11 });
+}
+
+function inWords({ kind, options }, value) {
+  if (kind === "knob") return short(value);
+  if (kind === "choice") return options.find((option) => option.value === value)?.label ?? value;
+  if (kind === "toggle") return value ? "on" : "off";
+  const text = value.replaceAll("\n", " / ");
+  return `“${text.length > LONGEST ? `${text.slice(0, LONGEST)}…` : text}”`;
+}

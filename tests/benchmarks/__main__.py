@@ -33,7 +33,7 @@ MEASURES = {
     "mpc": mpc.everything,
     "value-iteration": dynamic_programming.on_the_pendulum,
     "q-learning": td_control.q_learning_steps,
-    "rl": rl.sweeps,
+    "rl": rl.everything,
     "slider": latency.slider_to_telemetry,
     "scene": latency.slider_to_scene,
     "knob": knob.knob_to_telemetry,

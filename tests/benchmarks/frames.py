@@ -9,8 +9,11 @@ from tests.served import Served
 from tests.viser_client import SceneClient
 
 WORK: Mapping[str, tuple[str, Mapping[str, Value]]] = {
+    "deep Q-learning, pendulum, 3 learners": ("dqn", {"learners": 3.0, "steps": 100000.0}),
+    "deep Q-learning, double pendulum": ("dqn", {"system": "double-pendulum", "width": 128.0}),
     "Q-learning and SARSA, pendulum": ("td-control", {"system": "pendulum", "episodes": 2000.0}),
     "Q-learning and SARSA, cliff": ("td-control", {"episodes": 2000.0}),
+    "TD(lambda), 19 states": ("td-lambda", {"episodes": 100.0}),
     "value iteration, pendulum": (
         "dynamic-programming",
         {"world": "pendulum", "nodes": 101.0, "gamma": 0.995},

@@ -1,4 +1,4 @@
-"""Reinforcement learning: sweeps of prediction and testbeds of bandits."""
+"""Reinforcement learning: sweeps of prediction, testbeds of bandits, and deep Q-learning."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -10,6 +10,7 @@ from labs.algorithms import bandits, prediction
 from labs.algorithms.exploration import BOLTZMANN, CONFIDENCE, THOMPSON, BehaviourPolicy
 from labs.problems.episodes import UpdateRule
 from labs.tasks.random_walk.walks import NINETEEN, walk_task
+from tests.benchmarks import dqn, stable_baselines3
 
 STEPS, DECAYS = 2 ** np.arange(10), (0.0, 0.4, 0.8, 0.9, 0.95, 0.975, 0.99, 1.0)
 ALPHAS = np.linspace(0.0, 1.0, 11)
@@ -22,6 +23,13 @@ STRATEGIES = {
     "lowest bound": BehaviourPolicy(CONFIDENCE, bound=1.0),
     "Thompson": BehaviourPolicy(THOMPSON, bound=1.0),
 }
+
+
+def everything() -> None:
+    """All of them."""
+    for measure in (sweeps, dqn.training, stable_baselines3.deep_q_learning):
+        measure()
+        print()
 
 
 def sweeps() -> None:

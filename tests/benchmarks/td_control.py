@@ -24,7 +24,7 @@ def q_learning_steps() -> None:
     ratio has to be 30 at least. Then every method of the lab, and the longest iteration of a
     training, which has to fit in a frame of the scene."""
     for name, task, episodes in (
-        ("cliff", grid_task(MAPS["cliff"], False, 0.0, 1.0, False), 2000),
+        ("cliff", grid_task(MAPS["cliff"], False, 0.0, False, 1.0, 1.0, False), 2000),
         ("pendulum", pendulum_task(0.95, 0.05, False), 500),
     ):
         for method in (Q_LEARNING, SARSA, SARSA_N, SARSA_LAMBDA):

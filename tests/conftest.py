@@ -72,17 +72,17 @@ def _lab(nodeid: str) -> str:
 
 
 class Lanes(LoadScopeScheduling):  # type: ignore[misc]
-    """What stays together in one lane: all tests of the server, almost all of the browser, those of
-    a lab, which share runs of its solver, else those of a file."""
+    """What stays together in one lane: all tests of the server; almost all of the browser, for an
+    open page takes a core's time for as long as it is open, and two at once take longer than one
+    after the other; those of a lab, which share runs of its solver; else those of a file."""
 
     def _split_scope(self, nodeid: str) -> str:
         nodeid = nodeid.removeprefix("tests/")
         path = nodeid.partition("::")[0]
         folder = path.partition("/")[0]
-        if path == "browser/test_comeback.py":
-            return "server"  # it ends the servers that those tests end, too
-        alone = folder == "labs" or path == "browser/test_every_lab.py"
-        return _lab(nodeid) or (path if alone else folder)
+        if path in ("browser/test_comeback.py", "browser/test_prefix.py"):
+            return "server"  # they start and end servers as those tests do
+        return _lab(nodeid) or (path if folder == "labs" else folder)
 
 
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Lanes:

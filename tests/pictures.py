@@ -20,6 +20,9 @@ WINDOW: ViewportSize = {"width": 1440, "height": 900}
 CARD_WINDOW: ViewportSize = {"width": 840, "height": 500}
 """[px] Of the page; for a card small, so that lines and labels are large in it."""
 
+FOLD = "[data-dock-region-collapse], [data-dock-column-collapse]"
+"""Of the scene's panel, as in static/js/scene.js."""
+
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.pictures", description=__doc__)
@@ -45,7 +48,10 @@ def main() -> None:
         else:
             target = _beside_article(options.lab)
             page.evaluate("document.querySelector('#robot').requestFullscreen()")
-            page.wait_for_timeout(8000)
+            page.wait_for_timeout(4000)
+            scene = next(frame for frame in page.frames if "/scene/" in frame.url)
+            scene.locator(FOLD).first.dispatch_event("click")  # open in full screen
+            page.wait_for_timeout(4000)
             image = _card(_shot(page))
         image.save(target, quality=72, method=6)
         print(f"{target}: {target.stat().st_size / 1024:.0f} KB")

@@ -1,5 +1,6 @@
 """A real orclab server for tests and measurements: started, spoken to, ended, or killed."""
 
+import asyncio
 import contextlib
 import json
 import os
@@ -7,14 +8,16 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from typing import IO, Any, Self
+from collections.abc import Callable, Coroutine, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import IO, Any, Self, TypeVar
 
 import httpx
 import psutil
 from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
+T = TypeVar("T")
 PATIENCE = 90.0
 """[s] What takes longer does not come any more, however busy the machine is."""
 
@@ -150,3 +153,9 @@ def until(true: Callable[[], bool], seconds: float = PATIENCE) -> None:
     while not true():
         assert time.monotonic() < end, "it did not come true in time"
         time.sleep(0.02)
+
+
+def run_apart(work: Coroutine[Any, Any, T]) -> T:
+    """As `asyncio.run`, on a thread of its own: Playwright has a loop on this one."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(asyncio.run, work).result()

@@ -10,6 +10,7 @@ import sys
 import tomllib
 from collections.abc import Iterator, Set
 from importlib.metadata import packages_distributions
+from itertools import chain
 from pathlib import Path
 
 from labs.engine.catalog import CHAPTERS, catalog
@@ -88,11 +89,11 @@ def packages(path: Path) -> set[str]:
 
 
 def part_of(module: str) -> str:
-    """Which part of `labs` a module belongs to: a layer, or the engine."""
+    """Which part of `labs` a module belongs to: a layer, the engine, or the tasks in Gymnasium."""
     _, *inner = module.split(".")
     if ".".join(module.split(".")[:2]) in CHAPTERS:
         return "lab" if len(inner) > 1 else "contract"
-    return inner[0] if len(inner) > 1 or inner[:1] in (["engine"],) else "contract"
+    return inner[0] if len(inner) > 1 or inner[:1] in (["engine"], ["gym"]) else "contract"
 
 
 def lab_of(module: str) -> str:
@@ -122,7 +123,9 @@ def test_imports_go_down_and_no_lab_imports_another() -> None:
             mine, other = part_of(here), part_of(there)
             if mine == "engine":
                 right = other in ("engine", "contract")
-            elif other == "engine" or LAYERS.index(other) > LAYERS.index(mine):
+            elif mine == "gym":
+                right = other not in ("engine", "lab")
+            elif other in ("engine", "gym") or LAYERS.index(other) > LAYERS.index(mine):
                 right = False
             else:
                 right = mine != other or mine != "lab" or lab_of(here) == lab_of(there)
@@ -141,9 +144,10 @@ def reach(module: str, found: set[str]) -> set[str]:
 
 
 def test_what_is_shared_serves_two_labs_or_one_to_come() -> None:
+    """Or a lab and Gymnasium."""
     used: dict[str, set[str]] = {}
     for module in MODULES:
-        if module.startswith("labs.") and part_of(module) == "lab":
+        if module.startswith("labs.") and part_of(module) in ("lab", "gym"):
             reach(module, used.setdefault(lab_of(module), set()))
     lonely = []
     for module, path in MODULES.items():
@@ -192,6 +196,7 @@ def test_what_is_imported_is_declared() -> None:
     declared = {need.split("==")[0].lower() for need in project["dependencies"]}
     # Parts of declared packages that are public under names of their own.
     declared |= {"starlette", "markupsafe", "pydantic-core"}
+    gym = {need.split("==")[0].lower() for need in project["optional-dependencies"]["gym"]}
     owners = packages_distributions()
     for path in sources("labs", "server"):
         for package in packages(path) - set(sys.stdlib_module_names) - OWN:
@@ -199,7 +204,8 @@ def test_what_is_imported_is_declared() -> None:
             # modules in a folder of its own, where nobody looks for owners.
             owning = owners.get(package, {"pinocchio": ["pin"]}.get(package, []))
             names = {name.lower().replace("_", "-") for name in owning}
-            assert names & declared, f"{name_of(path)} imports {package} of {names}"
+            known = declared | gym if part_of(module_of(path)) == "gym" else declared
+            assert names & known, f"{name_of(path)} imports {package} of {names}"
 
 
 # Dependencies ---------------------------------------------------------------------------------
@@ -207,8 +213,11 @@ def test_what_is_imported_is_declared() -> None:
 
 def test_direct_dependencies_are_pinned() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    for need in (*project["dependencies"], *project["optional-dependencies"]["test"]):
+    needs = [*project["dependencies"], *chain(*project["optional-dependencies"].values())]
+    for need in needs:
         assert re.fullmatch(r"[A-Za-z0-9-]+==[0-9.]+", need), need
+    versions = {need.split("==")[0]: need for need in needs}
+    assert set(needs) == set(versions.values()), "one version of each, in all extras"
 
 
 def test_every_dependency_says_why_it_is_there() -> None:

@@ -154,14 +154,16 @@ def test_the_three_forms_hold_the_same_run(orclab: Orclab, tmp_path: Path) -> No
         line = "run oscillator --seconds 1 --seed 3 --set noisy=true"
         result = orclab(*line.split(), "--out", path)
         assert the_object(result)["seed"] == 3
-        assert result.stderr == f"wrote {path}\n"
+        assert result.stderr.startswith(f"wrote {path}\n")
+    beside = json.loads((tmp_path / "run.about.json").read_text())
     data = json.loads((tmp_path / "run.json").read_text())
     with np.load(tmp_path / "run.npz") as arrays:
         assert json.loads(str(arrays["about"]))["params"]["noisy"] is True
         for name, values in data["channels"].items():
             read = np.array(values, dtype=float)
             assert np.array_equal(read, arrays[name], equal_nan=True), name
-    _, header, *lines = csv.reader((tmp_path / "run.csv").read_text().splitlines())
+    assert beside["params"] == data["params"]
+    header, *lines = csv.reader((tmp_path / "run.csv").read_text().splitlines())
     column = [float(line[header.index("x")]) for line in lines]
     assert column == data["channels"]["x"]
     assert len(column) == 101

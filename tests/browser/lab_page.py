@@ -34,7 +34,7 @@ WHOLE = """([selector, first]) => {
 }"""
 
 FILLED = """selector => [...document.querySelectorAll(selector)].every(plot => {
-  const marks = "td, .note p, .chart :is(.curve, .point, .column), .heatmaplayer image";
+  const marks = "td, .note p, .chart :is(.curve, .point, .column)";
   if (plot.querySelector(marks)) return true;
   const canvas = plot.querySelector("canvas");
   if (!canvas) return false;

@@ -188,7 +188,7 @@ def test_no_address_outside_is_asked(visit: Visit, served: Served) -> None:
     page.on("request", lambda request: asked.append(request.url))
     lab = LabPage(page).open("oscillator")
     lab.pin("Field")
-    expect(page.locator("#plots .js-plotly-plot")).to_be_visible()
+    lab.wait_filled("#plots .plot:not([hidden])")
     expect(lab.scene.locator("canvas").first).to_be_visible()
     page.wait_for_load_state("networkidle")
     foreign = [

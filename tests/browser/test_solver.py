@@ -150,9 +150,7 @@ def test_a_page_opened_at_the_first_start_says_what_goes_on(visit: Visit, tmp_pa
         page = visit(server).new_page()
         LabPage(page, scene=False)
         page.goto("/labs/descent")
-        expect(page.locator("#curtain")).to_contain_text(
-            "The first start compiles the solvers, once"
-        )
+        expect(page.locator("#curtain")).to_contain_text("it compiles the solvers, once")
         expect(page.locator("#curtain .once")).to_be_visible()
         screenshot(page, "first-start")
         prepared.touch()

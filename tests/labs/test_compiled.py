@@ -1,11 +1,18 @@
 """What is compiled: ahead of the first click, and again when its source has changed."""
 
 import json
+import os
+import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
-from labs.compiled import forget_stale
+import pytest
+
+from labs.compiled import cache_folder, forget_stale
+
+ROOT = Path(__file__).parents[2]
 
 AFTERWARDS = """
 import json, sys
@@ -88,3 +95,81 @@ def test_what_was_compiled_is_forgotten_when_a_source_changes(tmp_path: Path) ->
     assert not forgets()
     callee.rename(package / "renamed.py")
     assert forgets()
+
+
+PROBE = """
+from labs.compiled import compiled
+
+@compiled
+def twice(x):
+    return x + x
+"""
+AS_NOBODY = """
+import ctypes, os, sys
+ctypes.CDLL(None).prctl(24, 1, 0, 0, 0)  # Of root's powers, not to be held by what may be written.
+os.execv(sys.executable, [sys.executable, "-c", sys.argv[1]])
+"""
+WITHOUT_A_HOME = """
+import json, sys
+from pathlib import Path
+from labs.probe import twice
+from server.cli import main
+
+assert main(["list"]) == 0
+result = twice(2)
+from numba.core import config
+kept = [path.name for path in Path(config.CACHE_DIR).rglob("probe.twice*")]
+print(json.dumps({"result": result, "folder": config.CACHE_DIR, "kept": kept}))
+"""
+
+
+def test_where_nothing_may_be_written_everything_works() -> None:
+    """Installed by somebody else, and used by one without a home: what is compiled is kept in a
+    temporary folder of this user's own."""
+    with tempfile.TemporaryDirectory() as name:
+        place = Path(name)
+        for package in ("labs", "server"):
+            ignored = shutil.ignore_patterns("__pycache__", "*.webp")
+            shutil.copytree(ROOT / package, place / package, ignore=ignored)
+        (place / "labs" / "probe.py").write_text(PROBE)
+        temporary = place / "tmp"
+        temporary.mkdir()
+        for path in (place, *place.rglob("*")):
+            path.chmod(0o555 if path.is_dir() else 0o444)
+        temporary.chmod(0o777)
+        environment = {k: v for k, v in os.environ.items() if k not in ("HOME", "ORCLAB_LABS")}
+        result = subprocess.run(
+            [sys.executable, "-c", AS_NOBODY, WITHOUT_A_HOME],
+            check=False,
+            cwd=place,
+            env=environment | {"TMPDIR": str(temporary), "XDG_CACHE_HOME": "/proc/none"},
+            capture_output=True,
+            text=True,
+        )
+        for path in (place, *place.rglob("*")):
+            path.chmod(0o755)
+    assert result.returncode == 0, result.stderr
+    *listed, last = result.stdout.splitlines()
+    assert len(listed) > 10
+    found = json.loads(last)
+    assert found["result"] == 4
+    assert found["folder"].startswith(str(temporary))
+    assert found["kept"]
+
+
+def test_a_folder_of_somebody_else_holds_no_code(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Code is loaded from there."""
+    package = tmp_path / "package"
+    package.mkdir()
+    assert cache_folder(package, "abc") == "", "beside the source"
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != package)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    own = cache_folder(package, "abc")
+    assert own == str(tmp_path / "home" / f"numba-orclab-{os.getuid()}" / "abc")
+    Path(own).parent.chmod(0o777)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    other = cache_folder(package, "abc")
+    assert other == str(tmp_path / f"numba-orclab-{os.getuid()}" / "abc")
+    assert Path(other).stat().st_mode & 0o077 == 0

@@ -352,7 +352,7 @@ def test_labels_fit_what_they_name_whatever_is_chosen(entry: Entry) -> None:
         counts = {name: len(said[name]) for name in said if not isinstance(said[name], str)}
         measured = lab.measure(world.params, world.state)
         pictured = lab.fields(world.params, world.state)
-        for plot in lab.plots:
+        for plot in (p for p in lab.plots if plots.is_shown(p, world.params.model_dump())):
             sizes: set[int] = set()
             if isinstance(plot, TimeSeries) and plot.select:
                 shapes = [np.shape(measured[line.channel]) for line in plot.lines]

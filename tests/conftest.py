@@ -90,6 +90,14 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Lanes:
     return Lanes(config, log)
 
 
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """A lane that only computes gives way to those with pages and servers: these follow real time,
+    and compute the more the longer they are kept waiting."""
+    live = item.nodeid.removeprefix("tests/").startswith(("browser/", "server/"))
+    if "PYTEST_XDIST_WORKER" in os.environ and not live:
+        os.setpriority(os.PRIO_PROCESS, 0, 10)
+
+
 @pytest.fixture(scope="session")
 def served() -> Iterator[Served]:
     """A server for all tests that leave it as they found it."""

@@ -43,3 +43,21 @@ def test_a_table_is_dropped_and_a_map_is_chosen_as_a_file(page: Page, tmp_path: 
     chooser.value.set_files(file)
     expect(lab.pin("The world")).to_contain_text("16 states")
     expect(lab.pin("The world")).to_contain_text("Read F as . (free).")
+
+
+def test_pasted_maps_have_their_published_values(page: Page) -> None:
+    """FrozenLake, and the 4 x 3 world of Russell and Norvig, from their text to the start's V."""
+    lake = "?gamma=0.99&slip=0.6666666666666666&sideways=true&living=0"
+    lab = LabPage(page, scene=False).open("dynamic-programming", lake)
+    start = page.locator(".tile", has_text="V of the start")
+    paste(lab, "SFFF\nFHFH\nFFFH\nHFFG\nG = reward 1\nH = cost 0")
+    expect(start).to_contain_text("−0.542")
+    lab.open("dynamic-programming", "?gamma=1&slip=0.2&sideways=true&living=0.04")
+    paste(lab, "...+\n.#.-\nS...")
+    expect(start).to_contain_text("−0.705")
+
+
+def paste(lab: LabPage, text: str) -> None:
+    """Into the map, which takes it with Ctrl+Enter."""
+    lab.value("map").fill(text)
+    lab.value("map").press("Control+Enter")

@@ -60,7 +60,10 @@ CORNERS = {True: 4, False: 20}
 """All tunables at an extreme at once, so many times; fewer for labs with a solver."""
 SETTINGS_OF_A_HANDLE = 3
 """In as many of those that offer it, each is dragged."""
-INERT = {"kinematics", "dynamics", "integration", "descent", "troublesome"}
+INERT = {
+    "kinematics", "dynamics", "integration", "bandits", "function-approximation",
+    "descent", "troublesome",
+}  # fmt: skip
 """Labs with nothing to press nor to drag."""
 
 SETTINGS = [

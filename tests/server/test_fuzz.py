@@ -20,6 +20,7 @@ OPERATIONS = [
     "POST /api/sessions/{session_id}/commands",
     "GET /api/sessions/{session_id}/command",
     "GET /api/sessions/{session_id}/export.{form}",
+    "GET /api/sessions/{session_id}/plots.{form}",
     "GET /api/sessions/{session_id}/solution.{form}",
     "PUT /api/sessions/{session_id}/solution",
 ]

@@ -64,7 +64,7 @@ class BanditParams(Params):
     """The strategy of blue, or of those whom blue watches. LCB: the lowest confidence bound."""
     second: str = STRATEGY.choice("epsilon", STRATEGIES, "Orange", key=True)
     """The strategy of orange, or of those whom orange watches. All meet the same luck."""
-    everybody: bool = STRATEGY.toggle(False, "All strategies")
+    everybody: bool = STRATEGY.toggle(False, "All strategies", key=True)
     """The others play, too, in the plots."""
     epsilon: float = STRATEGY.knob(
         0.1,

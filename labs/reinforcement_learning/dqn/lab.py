@@ -175,6 +175,7 @@ class Dqn(Lab[DqnParams, DqnState]):
         for options in (params.options, params.options._replace(double=True)):
             dqn.step(params.task.robot, options, agent, 40)
         lab.step(params, Inputs(), state)
+        lab.fields(params, state)
         table_map()
         compared()
         learning_task("ur5")

@@ -70,6 +70,11 @@ class ApproximationParams(Params):
     m: float = FEATURES.knob(6, 1, 10, "m", "", "The same, each way", step=1, key=True, when=PLANE)
     """Along the angle and along the velocity: their products are the features."""
 
+    data: str = LEARNING.choice(
+        "latest", DATA, "Learns from", effect="restart", key=True, when=FITTED
+    )
+    """Each sample once as it comes; or from a fixed batch of episodes, in random order, again and
+    again; or the weights of least squares (prediction only)."""
     target: str = LEARNING.choice(
         "mc", TARGETS, "Target", effect="restart", key=True, when=PREDICTION
     )
@@ -82,11 +87,6 @@ class ApproximationParams(Params):
         when={"world": "swing", "data": "latest"},
     )
     """Whose target q(x, u, w) is moved towards."""
-    data: str = LEARNING.choice(
-        "latest", DATA, "Learns from", effect="restart", key=True, when=FITTED
-    )
-    """Each sample once as it comes; or from a fixed batch of episodes, in random order, again and
-    again; or the weights of least squares (prediction only)."""
     alpha: float = LEARNING.knob(
         2e-4,
         1e-5,

@@ -15,6 +15,7 @@ from labs.params import Value
 from labs.reinforcement_learning.dynamic_programming.lab import DynamicProgramming
 from labs.tasks.grid_world.map import GridWorld
 from labs.tasks.mdp_table.params import TAXICAB
+from server.cli import main
 from tests.labs.tasks.published import LAKES, UTILITIES, frozen_lake, optimal_rewards
 from tests.labs.tasks.published import TAXICAB as PUBLISHED
 
@@ -39,6 +40,18 @@ def test_the_4_x_3_world_has_its_utilities() -> None:
     assert isinstance(place, GridWorld)
     values = place.on_map(-world.state.iterates.V[3], np.nan)
     np.testing.assert_allclose(values, UTILITIES, atol=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "reward"), [("FrozenLake", 0.542), ("FrozenLake 8 x 8", 0.415), ("4 x 3 world", 0.705)]
+)
+def test_published_maps_are_solved_on_the_command_line(
+    name: str, reward: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    settings = [f"--set={key}={value}" for key, value in PRESETS[name].items()]
+    assert main(["run", SLUG, "--seconds", "0", *settings]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["at_start"] == pytest.approx(-reward, abs=5e-4)
 
 
 def wanted(by_state: str) -> None:

@@ -25,6 +25,7 @@ import numpy as np
 
 from labs.algorithms.features import Features, add_features, evaluate
 from labs.algorithms.monte_carlo import costs_to_go
+from labs.algorithms.temporal_difference import n_step_return
 from labs.compiled import compiled, inlined
 from labs.problems.episodes import UpdateRule, step_size
 from labs.problems.prediction import Episode, PredictionTask, importance
@@ -106,14 +107,10 @@ def semi_gradient_n_step(
     """n-step semi-gradient TD, on-policy."""
     states, gamma, first = episode.states, task.task.gamma, max(T - rule.n, 0)
     for t in range(first):
-        J = evaluate(features, w, states[t + rule.n])
-        for k in range(t + rule.n - 1, t - 1, -1):
-            J = episode.costs[k] + gamma * J
+        rest = evaluate(features, w, states[t + rule.n])
+        J = n_step_return(gamma, episode, t, rule.n, rest)
         _move(features, rule, w, count, states[t], J)
-    J = evaluate(features, w, states[T])
-    for t in range(T - 1, first - 1, -1):
-        J = episode.costs[t] + gamma * J
-        episode.returns[t] = J
+    costs_to_go(gamma, episode, T, evaluate(features, w, states[T]), first)
     for t in range(first, T):
         _move(features, rule, w, count, states[t], episode.returns[t])
 

@@ -21,10 +21,11 @@ from labs.problems.prediction import Episode
 
 
 @compiled
-def costs_to_go(gamma: float, episode: Episode, T: int, rest: float) -> None:
-    """Writes J_t into the episode's returns; `rest` is the value of its last state."""
+def costs_to_go(gamma: float, episode: Episode, T: int, rest: float, begin: int = 0) -> None:
+    """Writes J_t from t = begin on into the episode's returns; `rest` is the value of its last
+    state."""
     J = rest
-    for t in range(T - 1, -1, -1):
+    for t in range(T - 1, begin - 1, -1):
         J = episode.costs[t] + gamma * J
         episode.returns[t] = J
 

@@ -16,9 +16,19 @@ as in `monte_carlo`."""
 
 import numpy as np
 
+from labs.algorithms.monte_carlo import costs_to_go
 from labs.compiled import compiled, inlined
 from labs.problems.episodes import UpdateRule, step_size
 from labs.problems.prediction import Episode
+
+
+@inlined
+def n_step_return(gamma: float, episode: Episode, t: int, n: int, rest: float) -> float:
+    """J_t of n costs, and the value of where they lead."""
+    J = rest
+    for k in range(t + n - 1, t - 1, -1):
+        J = episode.costs[k] + gamma * J
+    return J
 
 
 @compiled
@@ -42,18 +52,15 @@ def n_step(
 ) -> None:
     """n-step TD with n = rule.n."""
     learned = V.copy() if rule.offline else V
-    states, costs, returns = episode.states, episode.costs, episode.returns
+    states = episode.states
     first = max(T - rule.n, 0)  # The first of the steps whose return reaches the end.
     for t in range(first):
         _learn_from_n_costs(gamma, episode, t, rule, V, N, learned)
-    J = V[states[T]]
-    for t in range(T - 1, first - 1, -1):
-        J = costs[t] + gamma * J
-        returns[t] = J
+    costs_to_go(gamma, episode, T, V[states[T]], first)
     for t in range(first, T):
         x = states[t]
         N[x] += 1
-        learned[x] += step_size(rule, N[x]) * (returns[t] - V[x])
+        learned[x] += step_size(rule, N[x]) * (episode.returns[t] - V[x])
     if rule.offline:
         V[:] = learned
 
@@ -79,7 +86,5 @@ def _learn_from_n_costs(
 ) -> None:
     x = episode.states[t]
     N[x] += 1
-    J = V[episode.states[t + rule.n]]
-    for k in range(t + rule.n - 1, t - 1, -1):
-        J = episode.costs[k] + gamma * J
+    J = n_step_return(gamma, episode, t, rule.n, V[episode.states[t + rule.n]])
     learned[x] += step_size(rule, N[x]) * (J - V[x])

@@ -6,6 +6,7 @@ TD(0)         l_0 + gamma V(x_1), V the estimates there are               biased
 
 import numpy as np
 
+from labs.algorithms.temporal_difference import n_step_return
 from labs.compiled import compiled
 from labs.problems.prediction import PredictionTask, empty_episode, sample_episode
 
@@ -28,8 +29,6 @@ def _sample(task: PredictionTask, V: np.ndarray, random: np.ndarray, targets: np
     gamma, episode = task.task.gamma, empty_episode(task.task.horizon)
     for k in range(targets.shape[1]):
         T = sample_episode(task, random, episode)
-        J = 0.0
-        for t in range(T - 1, -1, -1):
-            J = episode.costs[t] + gamma * J
+        J = n_step_return(gamma, episode, 0, T, 0.0)
         targets[0, k] = J if task.task.terminal[episode.states[T]] else np.nan
         targets[1, k] = episode.costs[0] + gamma * V[episode.states[1]]

@@ -5,7 +5,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike
 
 from labs.colors import NO_VALUE
 from labs.engine.catalog import find
@@ -22,6 +21,7 @@ from tests.labs.reinforcement_learning.dynamic_programming.worlds import (
     params_of,
     solved,
 )
+from tests.labs.tasks.drawn import Drawn
 
 # Solving --------------------------------------------------------------------------------------
 
@@ -104,23 +104,6 @@ def test_what_has_no_limit_is_not_begun_and_says_why() -> None:
     assert (swinging.state.iterates.count > 0).tolist() == [False, False, True, True]
 
 
-class BoardColors(NullScene):
-    """Of the cells drawn."""
-
-    colors: np.ndarray
-
-    def cells(
-        self,
-        name: str,
-        origin: ArrayLike,
-        size: float,
-        colors: np.ndarray,
-        *,
-        clickable: bool = True,
-    ) -> None:
-        self.colors = colors
-
-
 @pytest.mark.parametrize("shown", ["evaluation", "policy", "modified", "value"])
 def test_what_has_no_value_is_left_out(shown: str) -> None:
     world = solved({"map": "S.#G", "gamma": 1.0, "shown": shown})
@@ -133,9 +116,9 @@ def test_what_has_no_value_is_left_out(shown: str) -> None:
     assert np.isnan(fields["V"]).all()
     for name in ("stationary", f"error_{shown}", f"backups_{shown}", "bound"):
         assert len(fields[name]) == 0, name
-    scene = BoardColors()
+    scene = Drawn()
     world.lab.draw(scene, world.params, world.state)
-    assert (scene.colors[0, :2] == NO_VALUE).all()
+    assert (scene.colors["board"][0, :2] == NO_VALUE).all()
 
 
 def test_cells_without_a_state_have_no_value_and_all_others_do() -> None:

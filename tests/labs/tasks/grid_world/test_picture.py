@@ -2,10 +2,8 @@
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike
 
 from labs.colors import NO_VALUE
-from labs.scene import Color, NullScene
 from labs.tasks.grid_world.map import MAPS, GridWorld
 from labs.tasks.grid_world.picture import (
     CLIFF,
@@ -18,61 +16,9 @@ from labs.tasks.grid_world.picture import (
     draw_way,
 )
 from labs.tasks.grid_world.walk import start_walk
+from tests.labs.tasks.drawn import Drawn, finite
 
 WORLD = GridWorld.parse("S.#\n.CG")
-
-
-class Drawn(NullScene):
-    """Keeps what is drawn."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.colors: dict[str, np.ndarray] = {}
-        self.points: dict[str, np.ndarray] = {}
-        self.labels: dict[str, str] = {}
-
-    def cells(
-        self,
-        name: str,
-        origin: ArrayLike,
-        size: float,
-        colors: np.ndarray,
-        *,
-        clickable: bool = True,
-    ) -> None:
-        super().cells(name, origin, size, colors, clickable=clickable)
-        self.colors[name] = colors
-        self.points[name] = np.asarray(origin)
-
-    def surface(self, name: str, points: np.ndarray, colors: np.ndarray) -> None:
-        super().surface(name, points, colors)
-        self.points[name], self.colors[name] = points, colors
-
-    def arrows(
-        self, name: str, starts: np.ndarray, ends: np.ndarray, color: Color = "force"
-    ) -> None:
-        super().arrows(name, starts, ends, color)
-        self.points[name] = np.stack([starts, ends])
-
-    def trail(
-        self, name: str, points: np.ndarray, color: Color = "actual", strength: float = 1.0
-    ) -> None:
-        super().trail(name, points, color, strength)
-        self.points[name] = points
-
-    def sphere(self, name: str, center: ArrayLike, radius: float, color: Color = "actual") -> None:
-        super().sphere(name, center, radius, color)
-        self.points[name] = np.asarray(center)
-
-    def label(self, name: str, text: str, position: ArrayLike) -> None:
-        super().label(name, text, position)
-        self.labels[name] = text
-
-
-def finite(scene: Drawn) -> bool:
-    return all(
-        np.isfinite(part).all() for parts in (scene.points, scene.colors) for part in parts.values()
-    )
 
 
 @pytest.mark.parametrize("relief", [False, True])

@@ -7,7 +7,7 @@ from labs.colors import NO_VALUE
 from labs.tasks.pendulum_table.picture import HEIGHT, draw_table
 from labs.tasks.pendulum_table.swing import push, start_swing
 from labs.tasks.pendulum_table.table import PendulumGrid
-from tests.labs.tasks.grid_world.test_picture import Drawn, finite
+from tests.labs.tasks.drawn import Drawn, finite
 
 GRID = PendulumGrid(q_nodes=21, v_nodes=15, levels=3)
 

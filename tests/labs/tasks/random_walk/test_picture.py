@@ -2,10 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike
 
-from labs.scene import Color, NullScene
-from labs.shapes import Vector3
 from labs.tasks.random_walk.picture import (
     BEYOND,
     FLOOR,
@@ -13,6 +10,7 @@ from labs.tasks.random_walk.picture import (
     GAIN,
     HEIGHT,
     LOSS,
+    ROW,
     cell_places,
     cell_size,
     draw_values,
@@ -22,52 +20,7 @@ from labs.tasks.random_walk.picture import (
     value_heights,
 )
 from labs.tasks.random_walk.walks import FIVE, NINETEEN, THOUSAND, walk_task
-
-
-class Drawn(NullScene):
-    """Keeps what is drawn."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.points: dict[str, np.ndarray] = {}
-        self.labels: dict[str, str] = {}
-        self.colors = np.zeros((0, 0, 3))
-
-    def cells(
-        self,
-        name: str,
-        origin: ArrayLike,
-        size: float,
-        colors: np.ndarray,
-        *,
-        clickable: bool = True,
-    ) -> None:
-        super().cells(name, origin, size, colors, clickable=clickable)
-        self.colors = colors
-
-    def sphere(self, name: str, center: ArrayLike, radius: float, color: Color = "actual") -> None:
-        super().sphere(name, center, radius, color)
-        self.points[name] = np.asarray(center)
-
-    def trail(
-        self, name: str, points: np.ndarray, color: Color = "actual", strength: float = 1.0
-    ) -> None:
-        super().trail(name, points, color, strength)
-        self.points[name] = points
-
-    def polygon(
-        self,
-        name: str,
-        corners: np.ndarray,
-        color: Color | Vector3 = "actual",
-        opacity: float = 1.0,
-    ) -> None:
-        super().polygon(name, corners, color, opacity)
-        self.points[name] = corners
-
-    def label(self, name: str, text: str, position: ArrayLike) -> None:
-        super().label(name, text, position)
-        self.labels[name] = text
+from tests.labs.tasks.drawn import Drawn
 
 
 def test_states_have_letters_while_there_are_enough() -> None:
@@ -79,10 +32,10 @@ def test_states_have_letters_while_there_are_enough() -> None:
 def test_the_ends_wear_their_costs_and_the_walker_is_between_its_cells() -> None:
     scene = Drawn()
     draw_walk(scene, NINETEEN, 2.5, np.full((19, 3), 0.5))
-    assert scene.colors.shape == (1, 21, 3)
-    assert tuple(scene.colors[0, 0]) == LOSS
-    assert tuple(scene.colors[0, -1]) == GAIN
-    assert (scene.colors[0, 1:-1] == 0.5).all()
+    assert scene.colors[ROW].shape == (1, 21, 3)
+    assert tuple(scene.colors[ROW][0, 0]) == LOSS
+    assert tuple(scene.colors[ROW][0, -1]) == GAIN
+    assert (scene.colors[ROW][0, 1:-1] == 0.5).all()
     assert scene.labels["left end"] == "1"
     assert "".join(scene.labels[f"state {name}"] for name in "ADGJMPS") == "ADGJMPS"
     assert scene.labels["right end"] == "−1"
@@ -90,7 +43,7 @@ def test_the_ends_wear_their_costs_and_the_walker_is_between_its_cells() -> None
     assert scene.points["walker"][0] == pytest.approx(between)
     scene = Drawn()
     draw_walk(scene, FIVE, None)
-    assert tuple(scene.colors[0, 0]) == FREE
+    assert tuple(scene.colors[ROW][0, 0]) == FREE
     assert "walker" not in scene.points
 
 

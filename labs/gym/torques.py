@@ -16,7 +16,8 @@ import numpy as np
 from labs.problems.environment import Environment
 from labs.random_numbers import seeded
 from labs.tasks.environments.reach import RANGES, VELOCITY_LIMIT, reach
-from labs.tasks.environments.swing_up import PERIOD, swing_up
+from labs.tasks.environments.swing_up import swing_up
+from labs.tasks.environments.torque_task import PERIOD
 
 ARM = 2.0
 """[m] Between two places of the UR5's tip at most."""

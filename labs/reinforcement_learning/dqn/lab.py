@@ -30,7 +30,7 @@ from labs.reinforcement_learning.dqn.training import (
 )
 from labs.scene import Scene
 from labs.tasks.environments.reach import reach
-from labs.tasks.environments.swing_up import PERIOD
+from labs.tasks.environments.torque_task import PERIOD
 
 PUSH = 3.0
 """[rad/s]"""

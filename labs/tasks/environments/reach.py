@@ -20,7 +20,7 @@ import pinocchio as pin
 from labs.models.arms import Arm, load
 from labs.models.two_link import TwoLink, directions, sample_postures, simulate, two_link
 from labs.random_numbers import uniform
-from labs.tasks.environments.swing_up import PERIOD
+from labs.tasks.environments.torque_task import PERIOD, SUBSTEPS, TorqueTask
 
 MOVING = (1, 2)
 """Shoulder lift and elbow."""
@@ -34,7 +34,7 @@ WEIGHTS = (1.0, 0.01, 0.01)
 
 
 @dataclass(frozen=True, eq=False)
-class Reach:
+class Reach(TorqueTask):
     """An `Environment`."""
 
     dynamics: TwoLink
@@ -48,12 +48,7 @@ class Reach:
 
     nx = 6
     observation_size = 8
-    substeps = 4
     horizon = 60
-
-    @property
-    def control_count(self) -> int:
-        return len(self.torques)
 
     def tips(self, Q: np.ndarray) -> np.ndarray:
         """(k, 3) [m] at joint angles Q (k, 2)."""
@@ -78,23 +73,14 @@ class Reach:
         ]
         return np.concatenate(parts, axis=1, dtype=np.float32)
 
-    def advance(self, X: np.ndarray, U: np.ndarray) -> np.ndarray:
-        return self.hold(X, self.torques[U], 1)
-
-    def step(self, X: np.ndarray, U: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        torques = self.torques[U]
-        return self.hold(X, torques), self.cost(X, torques), np.zeros(len(X), bool)
-
     def cost(self, X: np.ndarray, torques: np.ndarray) -> np.ndarray:
-        """l (k,) of a step from X (k, nx) under any torques (k, 2) [N m]."""
         w_p, w_v, w_u = WEIGHTS
         distance = np.linalg.norm(self.tips(X[:, 4:]) - self.tips(X[:, :2]), axis=1)
         effort = ((torques / self.largest) ** 2).sum(axis=1)
         return np.asarray(w_p * distance + w_v * (X[:, 2:4] ** 2).sum(axis=1) + w_u * effort)
 
-    def hold(self, X: np.ndarray, torques: np.ndarray, parts: int = substeps) -> np.ndarray:
-        """X (k, nx) so many parts of a step later, under torques (k, 2) [N m]."""
-        body, h, limits = self.dynamics, PERIOD / self.substeps, np.full(2, VELOCITY_LIMIT)
+    def hold(self, X: np.ndarray, torques: np.ndarray, parts: int = SUBSTEPS) -> np.ndarray:
+        body, h, limits = self.dynamics, PERIOD / SUBSTEPS, np.full(2, VELOCITY_LIMIT)
         return simulate(2, body.inertia, body.gravity, X, torques, limits, h, parts)
 
 

@@ -1,12 +1,12 @@
 """Swinging up and balancing, to be learned: pendulums whose motors choose among a few torques, for
 deep Q-learning and Gymnasium.
 
-A step holds the torque for a period, in substeps of v += a h, q += v h, and costs
+A substep is v += a h, q += v h, and a step costs
 
     l = w_q' (q - q*)^2 + w_v' v^2 + w_u' u^2       of angles within half a turn of the goal q*
 
 The pendulum's cost and its motor, too weak to lift it, are those of Gymnasium's Pendulum-v1; its
-rod is half as long. No state ends the task.
+rod is half as long.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,15 +20,14 @@ from labs.errors import LabError
 from labs.models.mechanisms import Mechanism, mechanism
 from labs.models.two_link import TwoLink, simulate, two_link
 from labs.random_numbers import uniform
+from labs.tasks.environments.torque_task import PERIOD, SUBSTEPS, TorqueTask
 
-PERIOD = 0.05
-"""[s] for which a control is held."""
 START_VELOCITY = 1.0
 """[rad/s] Episodes begin anywhere, at most this fast."""
 
 
 @dataclass(frozen=True, eq=False)
-class SwingUp:
+class SwingUp(TorqueTask):
     """An `Environment`: x = (q, v), of revolute joints."""
 
     mechanism: Mechanism
@@ -41,7 +40,6 @@ class SwingUp:
     weights: tuple[np.ndarray, np.ndarray, np.ndarray]
     """w_q (nq,), w_v (nq,), w_u (number of motors,)"""
 
-    substeps = 4
     horizon = 200
 
     @property
@@ -51,10 +49,6 @@ class SwingUp:
     @property
     def observation_size(self) -> int:
         return 3 * self.mechanism.nq
-
-    @property
-    def control_count(self) -> int:
-        return len(self.torques)
 
     @cached_property
     def dynamics(self) -> TwoLink:
@@ -73,22 +67,13 @@ class SwingUp:
         parts = [np.cos(angle), np.sin(angle), X[:, n:] / self.velocity_limit]
         return np.concatenate(parts, axis=1, dtype=np.float32)
 
-    def advance(self, X: np.ndarray, U: np.ndarray) -> np.ndarray:
-        return self.hold(X, self.torques[U], 1)
-
-    def step(self, X: np.ndarray, U: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        torques = self.torques[U]
-        return self.hold(X, torques), self.cost(X, torques), np.zeros(len(X), bool)
-
     def cost(self, X: np.ndarray, torques: np.ndarray) -> np.ndarray:
-        """l (k,) of a step from X (k, nx) under any torques (k, motors) [N m]."""
         n, (w_q, w_v, w_u) = self.mechanism.nq, self.weights
         angle = np.remainder(X[:, :n] - self.goal + np.pi, 2.0 * np.pi) - np.pi
         return np.asarray(angle**2 @ w_q + X[:, n:] ** 2 @ w_v + torques**2 @ w_u)
 
-    def hold(self, X: np.ndarray, torques: np.ndarray, parts: int = substeps) -> np.ndarray:
-        """X (k, nx) so many parts of a step later, under torques (k, motors) [N m]."""
-        body, h = self.dynamics, PERIOD / self.substeps
+    def hold(self, X: np.ndarray, torques: np.ndarray, parts: int = SUBSTEPS) -> np.ndarray:
+        body, h = self.dynamics, PERIOD / SUBSTEPS
         tau = torques @ self.mechanism.S.T
         return simulate(
             body.joints, body.inertia, body.gravity, X, tau, self.velocity_limit, h, parts

@@ -130,12 +130,13 @@ class SurfaceNode(Node):
 def exposure(view: View, points: np.ndarray | None = None) -> float:
     """How much brighter the scene's light makes a colour (linear): a value's colour is made so
     much darker, to be about the one its legend shows. A flat thing through `points` (..., 3) that
-    stands upright along an axis has less light than what lies."""
+    stands upright along an axis, though it is no more than a line yet, has less light than what
+    lies."""
     lying, standing = (1.5, 0.55) if view.graphics == "low" else (2.7, 1.4)
     if points is None:
         return lying
-    x, y, z = np.ptp(points.reshape(-1, 3), axis=0)
-    return standing if min(x, y) < FLAT < z else lying
+    along = np.ptp(points.reshape(-1, 3)[:, :2], axis=0)
+    return standing if along.min() < FLAT else lying
 
 
 def glb(points: np.ndarray, colors: np.ndarray, exposure: float) -> bytes:

@@ -184,6 +184,8 @@ def test_what_stands_upright_is_made_less_dark_than_what_lies() -> None:
         assert boards.exposure(view, flat) == boards.exposure(view, relief) == lying
         for way in ([2, 0, 1], [1, 2, 0]):
             assert boards.exposure(view, flat[..., way]) < lying
+            grown_from = flat[..., way] * [1.0, 1.0, 0.0]  # a line along x or y
+            assert boards.exposure(view, grown_from) == boards.exposure(view, flat[..., way])
 
 
 # Arrows ---------------------------------------------------------------------------------------

@@ -115,7 +115,7 @@ def draw_values(
     width = 0.72 * size / max(len(values), 1)
     half = 0.5 * size * (n + 2)
     scene.trail("V = 0", np.array([[-half, 0.0, zero], [half, 0.0, zero]]), "muted")
-    scene.label("zero", "V = 0", (-half - 0.1, 0.0, zero))
+    scene.label("zero", "V = 0", (half - 0.2, 0.0, zero + 0.1))
     for m, V in enumerate(values):
         left = x + width * (m - 0.5 * len(values)) + 0.01 * size
         right = left + width - 0.02 * size

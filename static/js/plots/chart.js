@@ -57,7 +57,11 @@ export class Chart {
       if (grid) this.line([x0, v], [x1, v], v === 0 && !logY ? "zero" : "grid");
       this.text(left - 0.5 * em, this.y(v) + 0.35 * em, yText(v), "end");
     }
+    // Numbers of bars that would touch are told in steps.
+    const numbers = xNames ? 0 : (xTicks ?? []).length;
+    const every = Math.max(1, Math.ceil((numbers * (0.56 * String(numbers).length + 0.4) * em) / this.area.width));
     for (const v of xTicks ?? (logX ? decades : ticks)(x0, x1, this.area.width / (6 * em), least)) {
+      if ((v - 1) % every && numbers) continue;
       if (grid && !xTicks) this.line([v, y0], [v, y1], v === 0 && !logX ? "zero" : "grid");
       const text = xNames?.[v - 1] ?? (logX ? power : label)(v);
       const [x, y] = [this.x(v), top + this.area.height + (slanted ? 1 : 1.5) * em];

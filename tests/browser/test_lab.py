@@ -317,9 +317,9 @@ def test_every_kind_of_plot_draws(page: Page) -> None:
     screenshot(page, "plots")
     axis = """async () => {
       const { power } = await import("/static/js/plots/ticks.js");
-      return [0.02, 1000, 1e-16, 5e-7, 2e4].map((value) => power(Math.log10(value)));
+      return [0.02, 1000, 2000, 1e-16, 5e-7, 2e4].map((value) => power(Math.log10(value)));
     }"""
-    assert page.evaluate(axis) == ["0.02", "1000", "10⁻¹⁶", "5·10⁻⁷", "2·10⁴"]
+    assert page.evaluate(axis) == ["0.02", "1000", "2000", "10⁻¹⁶", "5·10⁻⁷", "2·10⁴"]
 
 
 def test_curves_are_named_and_can_be_hidden(page: Page) -> None:

@@ -38,8 +38,8 @@ def draw_line(
         for phi in features.T
     ]
     scene.trail("features", np.stack(strips), "muted")
-    scene.label("features below", "features", (-0.56 * WIDTH, 0.0, FLOOR + 0.5 * STRIP))
-    scene.label("truth above", "truth", (x[-1] + 0.14, 0.0, _height(float(truth[-1]))))
+    scene.label("features below", "features", (-0.43 * WIDTH, 0.0, FLOOR + STRIP + 0.07))
+    scene.label("truth above", "truth", (0.44 * WIDTH, 0.0, _height(float(truth[-1])) - 0.07))
     at = WIDTH * (place / (len(truth) - 1) - 0.5)
     here = float(np.interp(place, some, estimates[shown][some]))
     scene.sphere("walker", (at, -0.02, _height(here)), 0.035, "warning")

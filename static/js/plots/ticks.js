@@ -48,10 +48,10 @@ export function decades(low, high, most) {
   return found;
 }
 
-// In words, the number whose logarithm this is: 0.02, 10⁻¹⁶, 5·10⁻⁷.
+// In words, the number whose logarithm this is: 0.02, 2000, 10⁻¹⁶, 5·10⁻⁷.
 export function power(exponent) {
   const value = Number((10 ** exponent).toPrecision(3));
-  if (Math.abs(exponent) <= 3) return label(value);
+  if (Math.abs(exponent) < 4) return label(value);
   const [mantissa, tens] = value.toExponential().split("e");
   const raised = tens.replace("+", "").replace(/[-0-9]/g, (c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]);
   return `${mantissa === "1" ? "" : `${mantissa}·`}10${raised}`;

@@ -24,10 +24,10 @@ class HttpProtocol(H11Protocol):
 
     def data_received(self, data: bytes) -> None:
         super().data_received(data)
-        if self._upgraded or self.conn.their_state not in (h11.IDLE, h11.SEND_BODY):
-            self._forget_deadline()
-        elif not self.transport.is_closing():
+        if self.conn.their_state in (h11.IDLE, h11.SEND_BODY):
             self._await_request()
+        else:
+            self._forget_deadline()
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._forget_deadline()
@@ -37,9 +37,12 @@ class HttpProtocol(H11Protocol):
         if self.conn.their_state is not h11.SEND_BODY:
             self._forget_deadline()  # the next request's first byte begins it anew
         super().on_response_complete()
+        if self.conn.their_state is h11.SEND_BODY:
+            self._await_request()  # its first bytes came with those of the one now answered
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
         self._upgraded = True
+        self._forget_deadline()
         super().handle_websocket_upgrade(event)
 
     def send_400_response(self, msg: str) -> None:
@@ -54,7 +57,7 @@ class HttpProtocol(H11Protocol):
             self.transport.close()
 
     def _await_request(self) -> None:
-        if not self._deadline:
+        if not (self._deadline or self._upgraded or self.transport.is_closing()):
             self._deadline = self.loop.call_later(self.request_seconds, self._give_up)
 
     def _forget_deadline(self) -> None:

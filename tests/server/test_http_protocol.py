@@ -67,18 +67,21 @@ async def answer(port: int, *parts: bytes) -> bytes:
 
 
 def test_what_does_not_end_is_ended_and_what_thinks_is_not() -> None:
-    """Nothing said; half a head; half a body; and after a whole request half of another."""
+    """Nothing said; half a head; half a body; and after a whole request half of another, later or
+    with it."""
     whole = HEAD + b"Content-Length: 2\r\n\r\nhi"
+    part = HEAD + b"Content-Length: 9\r\n\r\nhi"
 
     async def speak() -> list[bytes]:
         async with serving() as port:
             unfinished = [(), (HEAD,), (HEAD, b"Content-Length: 9\r\n\r\n", b"hi")]
-            sayings = [*unfinished, (whole,), (HEAD, whole.removeprefix(HEAD)), (whole, HEAD)]
+            answered = [(whole,), (HEAD, whole.removeprefix(HEAD)), (whole, HEAD), (whole + part,)]
+            sayings = [*unfinished, *answered]
             return await asyncio.gather(*(answer(port, *parts) for parts in sayings))
 
-    *ended, once, in_parts, twice = run_apart(speak())
+    *ended, once, in_parts, twice, at_once = run_apart(speak())
     assert not any(said.startswith(b"HTTP/1.1 200") for said in ended)
-    for said in (once, in_parts, twice):
+    for said in (once, in_parts, twice, at_once):
         assert said.startswith(b"HTTP/1.1 200")
         assert said.endswith(b"hi")
         assert said.count(b"HTTP/1.1") == 1

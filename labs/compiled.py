@@ -46,11 +46,9 @@ def source_digest(package: Path) -> str:
     return digest.hexdigest()
 
 
-def forget_stale(package: Path) -> bool:
-    """Deletes what was compiled in a package if a source with compiled functions has changed since;
-    whether it did. Numba sees that a function's own file changed, but not the file of a function
-    it calls."""
-    digest = source_digest(package)
+def forget_stale(package: Path, digest: str) -> bool:
+    """Deletes what was compiled in a package from sources of another digest; whether it did. Numba
+    sees that a function's own file changed, but not the file of a function it calls."""
     stamp = package / "__pycache__" / "compiled.sha256"
     known = stamp.read_text() if stamp.exists() else ""
     if known == digest:
@@ -84,8 +82,8 @@ def on_compilation(tell: Callable[[], None]) -> Iterator[None]:
 def cache_folder(package: Path, digest: str) -> str:
     """Where Numba may keep what it compiles: "" beside the source, as usual, or where that cannot
     be written, as by one who did not install it, a folder of this user's own."""
-    beside = (package, package / "__pycache__")
-    if all(os.access(path, os.W_OK) for path in beside if path.exists()):
+    beside = (package, *package.rglob("__pycache__"))
+    if all(os.access(path, os.W_OK) for path in beside):
         return ""
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     for parent in (home, tempfile.gettempdir()):
@@ -107,11 +105,12 @@ def _is_own(folder: Path) -> bool:
 def _prepare_cache(package: Path) -> None:
     if os.environ.get("NUMBA_CACHE_DIR"):
         return  # somebody chose a place
-    if folder := cache_folder(package, source_digest(package)[:16]):
+    digest = source_digest(package)
+    if folder := cache_folder(package, digest[:16]):
         os.environ["NUMBA_CACHE_DIR"] = folder
         config.reload_config()  # type: ignore[no-untyped-call]
     else:
-        forget_stale(package)
+        forget_stale(package, digest)
 
 
 _prepare_cache(Path(__file__).parent)

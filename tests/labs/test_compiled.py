@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from labs.compiled import cache_folder, forget_stale
+from labs.compiled import cache_folder, forget_stale, source_digest
 
 ROOT = Path(__file__).parents[2]
 
@@ -81,7 +81,7 @@ def test_what_was_compiled_is_forgotten_when_a_source_changes(tmp_path: Path) ->
     def forgets() -> bool:
         (cache / "caller.f.nbi").write_text("")
         (cache / "caller.f.1.nbc").write_text("")
-        said = forget_stale(package)
+        said = forget_stale(package, source_digest(package))
         left = sorted(path.name for path in cache.iterdir())
         assert left == (["other.pyc"] if said else ["caller.f.1.nbc", "caller.f.nbi", "other.pyc"])
         return said
@@ -162,9 +162,10 @@ def test_a_folder_of_somebody_else_holds_no_code(
 ) -> None:
     """Code is loaded from there."""
     package = tmp_path / "package"
-    package.mkdir()
+    inner = package / "inner" / "__pycache__"
+    inner.mkdir(parents=True)
     assert cache_folder(package, "abc") == "", "beside the source"
-    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != package)
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != inner)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
     own = cache_folder(package, "abc")
     assert own == str(tmp_path / "home" / f"numba-orclab-{os.getuid()}" / "abc")

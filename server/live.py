@@ -108,8 +108,9 @@ class LiveSession:
         hold: float | None,
         compare: dict[str, Any] | None,
     ) -> dict[str, Any]:
+        chosen = self.world.lab.Params().change(params)  # refused before the comparison is made
         compared = self._make_comparison(**compare) if compare else None
-        answer = self._do_params(self.world.lab.Params().model_dump() | params)
+        answer = self._do_params(chosen.model_dump())
         if speed is not None:
             self._do_speed(speed)
         if pace is not None and self.world.lab.has_solver():

@@ -219,6 +219,8 @@ class LiveSession:
             try:
                 Path(path).write_bytes(content())
                 error = ""
+            except LabError as refused:
+                error = str(refused)
             except OSError as problem:
                 error = f"the file could not be written: {problem}"
             self.link.send(CONTROL, {"ref": done, "answer": None, "error": error})

@@ -4,7 +4,7 @@ import json
 from collections.abc import Callable
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from labs.engine.catalog import catalog, find
@@ -13,6 +13,7 @@ from labs.engine.run import World
 from labs.engine.solution import Solution
 from labs.errors import LabError
 from labs.params import Params, Text
+from tests.fuzzing import REPEATABLE, SCALARS
 
 LONGEST_ERROR, SHOWN = 2000, 6
 TEXTS = [
@@ -26,13 +27,7 @@ LETTERS = st.sampled_from(
 )
 WORDS = ["1e9000000", "1/0", "nan", "-inf", "1e-320", "1/3", "100%", "||", "state", "cost", "to"]
 SPLINTERS = st.sampled_from([*WORDS, "sep=;", "9" * 200, "1" * 4000])
-sometimes = settings(
-    max_examples=100,
-    deadline=None,
-    derandomize=True,
-    database=None,
-    suppress_health_check=list(HealthCheck),
-)
+sometimes = settings(REPEATABLE, max_examples=100)
 
 
 @st.composite
@@ -117,8 +112,7 @@ def test_the_parts_of_a_solution_are_taken_or_refused() -> None:
     """Sound JSON that says something else."""
     whole = found("descent").to_dict()
     world = World(find("descent"))
-    scalars = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8)
-    anything = st.recursive(scalars, lambda inner: st.lists(inner, max_size=4), max_leaves=8)
+    anything = st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=4), max_leaves=8)
 
     @sometimes
     @given(data=st.data())

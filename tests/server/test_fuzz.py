@@ -4,10 +4,11 @@ from typing import Any
 
 import pytest
 import schemathesis
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from schemathesis import GenerationMode
 from schemathesis.specs.openapi.checks import positive_data_acceptance
 
+from tests.fuzzing import REPEATABLE
 from tests.served import Served, until
 
 OPERATIONS = [
@@ -50,13 +51,7 @@ def test_the_api_withstands_fuzzing(served: Served, operation: str, mode: Genera
     with served.session("oscillator") as session:
         live = session.info["id"]
 
-        @settings(
-            max_examples=60,
-            deadline=None,
-            derandomize=True,
-            database=None,
-            suppress_health_check=list(HealthCheck),
-        )
+        @settings(REPEATABLE, max_examples=60)
         @given(case=target.as_strategy(generation_mode=mode))
         def attack(case: Any) -> None:
             if "session_id" in case.path_parameters and method != "DELETE":

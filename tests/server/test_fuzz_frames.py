@@ -6,22 +6,22 @@ import random
 from typing import Any, cast
 
 import orjson
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from websockets.exceptions import ConnectionClosed
 
 from labs.engine.catalog import find
 from server.session import Session
 from server.stream import answer_request
+from tests.fuzzing import REPEATABLE, SCALARS
 from tests.served import Served, run_apart
 from tests.viser_client import SceneClient, message
 
 COMMANDS = ["run", "pause", "step", "reset", "speed", "seed", "apply", "press", "view"]
 COMMANDS += ["reset_view", "solver_run", "solver_step", "solver_show", "solver_pace", "dance"]
 NAMES = ["factor", "count", "seed", "params", "action", "view", "pace", "iteration", "compare"]
-scalars = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8)
 anything = st.recursive(
-    scalars,
+    SCALARS,
     lambda inner: (
         st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3)
     ),
@@ -49,13 +49,7 @@ def test_every_message_is_answered() -> None:
     """Whatever it is; and what reaches the worker can be sent there."""
     taken = 0
 
-    @settings(
-        max_examples=300,
-        deadline=None,
-        derandomize=True,
-        database=None,
-        suppress_health_check=list(HealthCheck),
-    )
+    @settings(REPEATABLE, max_examples=300)
     @given(data=st.data())
     def attack(data: st.DataObject) -> None:
         nonlocal taken

@@ -37,7 +37,6 @@ from labs.plots import (
     measured,
 )
 
-FORMS = ("csv", "json", "zip")
 TOLERANCE = 1e-9
 """Of a heat map's axes: an arrow this near to the middle of a cell stands in that cell."""
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from labs.engine.headless import run
-from labs.engine.plot_data import FORMS, PlotData, file_name
+from labs.engine.plot_data import PlotData, file_name
 from labs.engine.run import World
 from labs.errors import LabError
 from labs.plots import is_shown
@@ -130,5 +130,4 @@ def test_what_is_not_there_is_refused(oscillator: World) -> None:
         PlotData.of(oscillator, ["Positions"])
     with pytest.raises(LabError, match="a table is of one plot"):
         PlotData.of(oscillator).csv()
-    assert set(FORMS) == {"csv", "json", "zip"}
     assert file_name("What V* does over X₀") == "what-v-does-over-x"

@@ -6,7 +6,6 @@ empty. JSON has what each plot says of itself (labs/plots.py) and, under "data",
 words it names: z of a heat map under `data[plot["z"]]`, (rows, columns).
 """
 
-import csv
 import io
 import json
 import re
@@ -18,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from labs.engine.record import versions
+from labs.engine.record import csv_table, versions
 from labs.engine.run import World
 from labs.errors import LabError
 from labs.plots import (
@@ -129,20 +128,7 @@ def _data(plot: Card, channels: Data, known: Data) -> Data:
 
 
 def _csv(plot: Card, data: Data) -> bytes:
-    header, rows = TABLES[type(plot)](plot, data)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(header)
-    writer.writerows([_cell(value) for value in row] for row in rows)
-    return text.getvalue().encode()
-
-
-def _cell(value: Any) -> str:
-    """A number with all its digits; nothing where there is none."""
-    if value is None or isinstance(value, str):
-        return value or ""
-    number = value.item() if isinstance(value, np.generic) else value
-    return "" if number != number else repr(number)
+    return csv_table(*TABLES[type(plot)](plot, data))
 
 
 def _time_series(plot: TimeSeries, data: Data) -> Table:

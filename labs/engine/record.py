@@ -3,9 +3,8 @@
 import csv
 import io
 import json
-import math
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -99,12 +98,7 @@ class Recording:
     def csv(self) -> bytes:
         """A header, a line a sample, and nothing else: what reads tables reads it without options.
         The other forms hold `about`, and a file beside it may (`description`)."""
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(self.columns)
-        for row in self.rows:
-            writer.writerow(["" if math.isnan(x) else repr(x) for x in row.tolist()])
-        return text.getvalue().encode()
+        return csv_table(self.columns, (row.tolist() for row in self.rows))
 
     def description(self) -> bytes:
         """`about`, for those that have the table alone."""
@@ -119,6 +113,20 @@ class Recording:
     def write(self, form: str) -> bytes:
         """`form` is "json", "csv" or "npz"."""
         return {"json": self.json, "csv": self.csv, "npz": self.npz}[form]()
+
+
+def csv_table(header: Sequence[str], rows: Iterable[Iterable[Any]]) -> bytes:
+    """Numbers with all their digits, and words; nothing where there is neither."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows([_cell(value) for value in row] for row in rows)
+    return text.getvalue().encode()
+
+
+def _cell(value: Any) -> Any:
+    plain = value.item() if isinstance(value, np.generic) else value  # a float32 with all it has
+    return plain if plain == plain else None
 
 
 def versions() -> dict[str, str]:

@@ -119,11 +119,7 @@ class FiniteMDP:
         """(U, X, K) sums of P along each row, for sampling: with r uniform in [0, 1), the next
         state is the first y (of the outcomes) with r < cumulative[u, x, y]. From the last y on
         that can be next the sums are exactly 1."""
-        P = self.probabilities if self.P is None else self.P
-        sums: np.ndarray = np.cumsum(P, axis=2)
-        last = P.shape[2] - 1 - (P[..., ::-1] > 0.0).argmax(axis=2)
-        sums[np.arange(P.shape[2]) >= last[..., None]] = 1.0
-        return sums
+        return cumulative_sums(self.probabilities if self.P is None else self.P)
 
     def sample(self, x: int, u: int, random: Callable[[], float]) -> int:
         """The next state; `random` draws evenly from [0, 1), once where chance has a say."""
@@ -134,9 +130,9 @@ class FiniteMDP:
 
     def transition_matrix(self, policy: np.ndarray) -> np.ndarray:
         """P^pi (X, X): of the Markov chain that remains under a policy."""
-        weights = self._weights(policy)
-        if self.P is not None and self.outcomes is not None:
+        if self.outcomes is not None:
             return np.asarray(self.sparse_chain(policy).toarray())
+        weights = self._weights(policy)
         if self.successor is None:
             return np.asarray(np.einsum("xu,uxy->xy", weights, self.probabilities))
         matrix = np.zeros((self.X, self.X))
@@ -185,10 +181,7 @@ class FiniteMDP:
         """(X,) bool: from where some controls may lead to a terminal state."""
         found: np.ndarray = self.terminal.copy()
         while True:
-            if self.successor is not None:
-                leads = found[self.successor].any(axis=1)
-            else:
-                leads = (self.expect(found.astype(float)) > 0.0).any(axis=1)
+            leads = (self.expect(found.astype(float)) > 0.0).any(axis=1)
             if not (leads & ~found).any():
                 return found
             found |= leads
@@ -218,6 +211,16 @@ def random_policy(mdp: FiniteMDP) -> np.ndarray:
     if mdp.available is None:
         return np.full((mdp.X, mdp.U), 1.0 / mdp.U)
     return np.asarray(mdp.available / mdp.available.sum(axis=1, keepdims=True))
+
+
+def cumulative_sums(probabilities: np.ndarray) -> np.ndarray:
+    """(..., k) sums of probabilities (..., k) along their rows, for sampling: from the last entry
+    on that is not 0 they are exactly 1, whatever rounding makes of them."""
+    count = probabilities.shape[-1]
+    sums: np.ndarray = np.cumsum(probabilities, axis=-1)
+    last = count - 1 - (probabilities[..., ::-1] > 0.0).argmax(axis=-1)
+    sums[np.arange(count) >= last[..., None]] = 1.0
+    return sums
 
 
 def _check_costs(mdp: FiniteMDP) -> None:
@@ -260,18 +263,18 @@ def _check_successors(mdp: FiniteMDP, table: np.ndarray) -> None:
 
 
 def _check_probabilities(mdp: FiniteMDP, P: np.ndarray) -> None:
-    ahead = np.arange(mdp.X) if mdp.outcomes is None else mdp.outcomes
-    if P.shape != (mdp.U, mdp.X, ahead.shape[-1]) or ahead.shape not in (P.shape, P.shape[2:]):
-        raise LabError(f"P has shape (U, X, X) = {(mdp.U, mdp.X, mdp.X)}; given: {P.shape}")
+    dense = (mdp.U, mdp.X, mdp.X)
+    ahead = np.broadcast_to(np.arange(mdp.X), dense) if mdp.outcomes is None else mdp.outcomes
+    if P.shape != ahead.shape or P.shape[:-1] != dense[:-1]:
+        raise LabError(f"P has shape (U, X, X) = {dense}; given: {P.shape}")
     if ((ahead < 0) | (ahead >= mdp.X)).any():
         raise LabError(f"outcomes holds {ahead.min()} to {ahead.max()}: states below {mdp.X} go")
     wrong = np.argwhere(~(P >= 0.0))
     if len(wrong):
         u, x, k = wrong[0]
-        y = np.broadcast_to(ahead, P.shape)[u, x, k]
         raise LabError(
-            f"from state {x} to state {y} under control {u} the probability is {P[u, x, y]:g}: "
-            "it must be a number from 0 to 1"
+            f"from state {x} to state {ahead[u, x, k]} under control {u} the probability is "
+            f"{P[u, x, k]:g}: it must be a number from 0 to 1"
         )
     sums = P.sum(axis=2)
     wrong = np.argwhere(~(np.abs(sums - 1.0) <= ROUNDING))
@@ -283,7 +286,7 @@ def _check_probabilities(mdp: FiniteMDP, P: np.ndarray) -> None:
         )
     ends = np.flatnonzero(mdp.terminal)
     # Not "but for rounding": whoever can leave does so in the end.
-    out = (P[:, ends] > 0.0) & (np.broadcast_to(ahead, P.shape)[:, ends] != ends[:, None])
+    out = (P[:, ends] > 0.0) & (ahead[:, ends] != ends[:, None])
     left = np.argwhere(out.any(axis=2))
     if len(left):
         u, i = left[0]

@@ -20,7 +20,7 @@ import numpy as np
 from labs.compiled import compiled, inlined
 from labs.errors import LabError
 from labs.problems.episodes import EpisodicTask, episodic_task, initial_state, transition
-from labs.problems.finite_mdp import FiniteMDP
+from labs.problems.finite_mdp import FiniteMDP, cumulative_sums
 from labs.random_numbers import below, uniform
 
 
@@ -152,7 +152,4 @@ def _probabilities(mdp: FiniteMDP, policy: np.ndarray) -> np.ndarray:
 def _cumulative(probabilities: np.ndarray) -> np.ndarray:
     if (probabilities == 1.0 / probabilities.shape[1]).all():
         return np.zeros((0, probabilities.shape[1]))
-    sums: np.ndarray = np.cumsum(probabilities, axis=1)
-    last = probabilities.shape[1] - 1 - (probabilities[:, ::-1] > 0.0).argmax(axis=1)
-    sums[np.arange(probabilities.shape[1]) >= last[:, None]] = 1.0
-    return sums
+    return cumulative_sums(probabilities)

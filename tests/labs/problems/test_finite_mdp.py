@@ -115,6 +115,11 @@ def test_wrong_probabilities_are_named() -> None:
     P[1, 2] = [1.0, 0.0, 0.0, 0.0]
     with pytest.raises(LabError, match="state 2 is terminal, yet control 1 leads out"):
         replace(three(), successor=None, P=P)
+    few = np.array([[[0.5, 0.5]] * 4] * 2)
+    few[1, 0] = 1.5, -0.5
+    to = np.array([[[2, 3]] * 4] * 2, np.int32)
+    with pytest.raises(LabError, match=r"to state 3 under control 1 the probability is -0\.5"):
+        replace(three(), successor=None, P=few, outcomes=to)
     P[1, 2] = [1e-12, 0.0, 1.0 - 1e-12, 0.0]
     with pytest.raises(LabError, match="state 2 is terminal, yet control 1 leads out"):
         replace(three(), successor=None, P=P)

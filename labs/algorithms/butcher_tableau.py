@@ -107,7 +107,7 @@ def _lines(text: str) -> list[str]:
     text = text.replace(",", " " if separated else ".")
     lines = [line.strip() for line in text.splitlines() if re.search(r"[^\s|+_=─-]", line)]
     return [
-        re.sub("&", " ", line if "|" in line else line.replace("&", "|", 1)).strip()
+        (line if "|" in line else line.replace("&", "|", 1)).replace("&", " ").strip()
         for line in lines
     ]
 

@@ -2,11 +2,14 @@
 quotes, with blanks or commas between the cells, in letters of other books.
 """
 
+import contextlib
+import math
 import re
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 
 from labs.errors import LabError
+from labs.number_texts import parse_number
 
 TRANSLATIONS = {"F": ".", "X": "#", " ": ".", "_": "."}
 """Letters of other maps: FrozenLake's frozen cells, mazes' walls and ways."""
@@ -105,8 +108,10 @@ def _kind(line: str, said: str, ends: bool) -> Kind:
             ends = True
             continue
         found = _VALUE.fullmatch(word)
-        value = _number(found[2]) if found else None
-        if not found or value is None or abs(value) > MAX_COST:
+        value = math.inf
+        with contextlib.suppress(ValueError):
+            value = parse_number(found[2]) if found else value
+        if not found or abs(value) > MAX_COST:
             raise LabError(
                 f"{line!r}: a letter has a cost or a reward of at most {MAX_COST:g}, and may be "
                 "an end: m = cost 3, or T = reward 5, end"
@@ -119,11 +124,3 @@ def _words(said: str) -> Iterator[str]:
     for word in said.split(","):
         if word.strip():
             yield " ".join(word.lower().split())
-
-
-def _number(text: str) -> float | None:
-    top, _, bottom = text.replace("−", "-").partition("/")
-    try:
-        return float(top) / float(bottom or "1")
-    except (ValueError, ZeroDivisionError):
-        return None

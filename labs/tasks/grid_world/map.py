@@ -158,26 +158,25 @@ class GridWorld(CellWorld):
     @cached_property
     def terminal(self) -> np.ndarray:
         """(X,) bool: the ends."""
-        return np.array([self.ends(self.kind(x)) for x in range(len(self.cells))])
+        return np.array(list(map(self.ends, self.kinds)))
 
     @cached_property
     def goals(self) -> np.ndarray:
         """(X,) bool: the ends that cost least."""
-        costs = np.array([self.cost(self.kind(x)) for x in range(len(self.cells))])
-        costs -= [self.kind(x) == "G" for x in range(len(self.cells))]  # a goal before a hole
+        costs = np.array(list(map(self.cost, self.kinds)))
+        costs -= [kind == "G" for kind in self.kinds]  # a goal before a hole
         least = costs[self.terminal].min()
         return np.asarray(self.terminal & (costs == least))
 
     @cached_property
     def start(self) -> int:
         """The state where an episode begins: S, or where there is none the first that is no end."""
-        kinds = [self.kind(state) for state in range(len(self.cells))]
-        return kinds.index("S") if "S" in kinds else int(np.argmin(self.terminal))
+        return self.kinds.index("S") if "S" in self.kinds else int(np.argmin(self.terminal))
 
-    def kind(self, state: int) -> str:
-        """The character of a state's cell."""
-        row, column = map(int, self.cells[state])
-        return self.rows[row][column]
+    @cached_property
+    def kinds(self) -> tuple[str, ...]:
+        """The character of each state's cell."""
+        return tuple(self.rows[row][column] for row, column in self.cells)
 
     @cached_property
     def table(self) -> tuple[np.ndarray, np.ndarray]:

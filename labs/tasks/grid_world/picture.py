@@ -108,10 +108,10 @@ def draw_board(
     scene.camera(*CAMERA, core=place.around)
     scene.cells(BOARD, place.origin, place.size, _colors(world, V, heights, goals=True))
     named = "SG+-" if len(world.cells) > LABELLED else set("".join(world.rows)) - {"."}
-    for x in range(len(world.cells)):
-        if world.kind(x) in named:
+    for x, kind in enumerate(world.kinds):
+        if kind in named:
             corner = place.centers[tuple(world.cells[x])] + place.size * np.array([-0.3, 0.3, 0.1])
-            scene.label(f"cell {x}", world.kind(x), corner)
+            scene.label(f"cell {x}", kind, corner)
     for column, wind in enumerate(world.wind):
         if wind:
             below = place.centers[-1, column] - (0.0, 0.8 * place.size, 0.0)

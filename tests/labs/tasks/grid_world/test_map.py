@@ -56,7 +56,7 @@ def test_the_wind_carries_upwards() -> None:
     assert step(world, 3, 6, DOWN) == (2, 6)
     assert step(world, 0, 6, LEFT) == (0, 5)
     assert step(world, 6, 3, DOWN) == (6, 3)
-    assert world.kind(world.start) == "S"
+    assert world.kinds[world.start] == "S"
 
 
 def test_the_wind_stops_at_a_wall() -> None:

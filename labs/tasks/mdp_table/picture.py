@@ -24,12 +24,12 @@ def draw_states(
     place, table = board(world), world.table
     scene.camera(*CAMERA, core=place.around)
     centers = place.centers[tuple(world.cells.T)]
+    known = np.isfinite(V)
+    colors = sequential(np.where(known, V, 0.0), *span)
+    colors[~known], colors[world.terminal] = NO_VALUE, WALL
     for x in range(len(centers)):
-        known = bool(np.isfinite(V[x]))
-        color = sequential(V[x : x + 1], *span)[0] if known else NO_VALUE
-        color = WALL if world.terminal[x] else color
         corner = centers[x] - 0.45 * place.size * np.array([1.0, 1.0, 0.0])
-        tint = np.array(color)[None, None]
+        tint = colors[x : x + 1, None]
         scene.cells(f"state {x + 1}", corner, 0.9 * place.size, tint, clickable=False)
         if len(centers) <= LABELLED:
             does = "" if policy is None or world.terminal[x] else table.control(x, int(policy[x]))

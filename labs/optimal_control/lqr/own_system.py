@@ -28,6 +28,8 @@ NAMES = ("A", "B", "Q", "R", "x0")
 MOST_STATES, MOST_CONTROLS = 8, 4
 LARGEST = 1e6
 """Of an entry; and of a state, relative to the largest of x0 or 1, before it is given up."""
+FASTEST = 1e3
+"""[1/s] Of what grows by itself in continuous time: exp(A T) is to be a number for every T."""
 EXAMPLE = "A = 1 0.1; 0 1\nB = 0.005; 0.1\nQ = diag(10, 1)\nR = 0.1\nx0 = 1 0"
 """A mass of 1 kg, pushed for 0.1 s a step."""
 
@@ -114,6 +116,10 @@ def own_system(text: str, continuous: bool = False) -> OwnSystem:
     if len(x0) != n:
         raise LabError(f"x0 has {len(x0)} numbers: A wants {n}")
     LqrProblem(1, a, b, q, r, q)
+    if continuous and (fastest := float(np.linalg.eigvals(a).real.max())) > FASTEST:
+        raise LabError(
+            f"A grows as exp({fastest:g} t): in continuous time exp({FASTEST:g} t) goes at most"
+        )
     return OwnSystem(a, b, q, r, x0, continuous)
 
 

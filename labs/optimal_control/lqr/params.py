@@ -2,6 +2,7 @@
 
 import numpy as np
 from pydantic import field_validator
+from pydantic_core.core_schema import ValidationInfo
 
 from labs.errors import LabError
 from labs.optimal_control.lqr.linear_systems import LINEAR_SYSTEMS, LinearSystem
@@ -37,11 +38,11 @@ class LqrParams(Params):
         "cart-pole", {**LINEAR_SYSTEMS, "own": "Your matrices"}, "System", key=True
     )
     """What is to be kept at rest."""
+    time: str = SYSTEM.choice("discrete", TIMES, "A and B are in", when=OWN)
+    """Continuous time is made discrete with the control held for a time step."""
     matrices: str = SYSTEM.text(EXAMPLE, "Your matrices", rows=6, max_length=2000, when=OWN)
     """A, B, Q, R and x0, each after its name, rows after one another with semicolons or on lines of
     their own; or as JSON; pasted or a file. Up to 8 states and 4 controls."""
-    time: str = SYSTEM.choice("discrete", TIMES, "A and B are in", when=OWN)
-    """Continuous time is made discrete with the control held for a time step."""
     deviation: float = SYSTEM.knob(
         0.3,
         -3.2,
@@ -125,9 +126,9 @@ class LqrParams(Params):
 
     @field_validator("matrices")
     @classmethod
-    def _are_matrices(cls, value: str) -> str:
+    def _are_matrices(cls, value: str, info: ValidationInfo) -> str:
         try:
-            own_system(value)
+            own_system(value, info.data.get("time") == "continuous")
         except LabError as error:
             raise ValueError(str(error)) from None
         return value

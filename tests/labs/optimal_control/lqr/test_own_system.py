@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from labs.errors import LabError
+from labs.errors import LabError, ParameterError
 from labs.optimal_control.lqr.own_system import EXAMPLE, own_system
 from tests.labs.optimal_control.lqr.simulation import lqr_params, states
 
@@ -80,6 +80,15 @@ def test_continuous_time_is_held() -> None:
     a, b = own_system(text, continuous=True).linear(0.1)
     np.testing.assert_allclose(a, A, atol=1e-15)
     np.testing.assert_allclose(b, B, atol=1e-15)
+
+
+def test_what_outgrows_all_numbers_in_continuous_time_is_refused() -> None:
+    fast = EXAMPLE.replace("1 0.1; 0 1", "1000 0; 0 1").replace("0.005; 0.1", "0.1; 1e6")
+    params = lqr_params({"system": "own", "matrices": fast, "time": "continuous", "period": 0.2})
+    assert "no steady state" in states(params, 0.1)[-1].trouble
+    with pytest.raises(ParameterError, match=r"matrices: A grows as exp\(3500 t\)"):
+        params.change({"matrices": fast.replace("1000", "3500")})
+    assert own_system(fast.replace("1000", "3500")).nx == 2
 
 
 def test_what_cannot_be_held_is_trouble_and_no_error() -> None:

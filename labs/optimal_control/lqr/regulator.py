@@ -116,7 +116,8 @@ class Regulator:
         if reference.trouble:
             return -1.0
         return float(
-            np.abs(self.steady.value - reference.value).max() / np.abs(reference.value).max()
+            np.abs(self.steady.value - reference.value).max()
+            / (np.abs(reference.value).max() or 1.0)
         )
 
     @cached_property
@@ -126,14 +127,14 @@ class Regulator:
 
     def relative_to_steady(self) -> tuple[np.ndarray, np.ndarray]:
         """Elements of P_t (N + 1, k) and K_t (N, k) as shares of their steady values, or of those
-        at t = 0 where there is no steady state: P_ii, and K_1i or, with several controls, K_ii;
-        at most six. An element whose steady value is zero is left out."""
+        at t = 0 where there is no steady state: P_ii, and of each column of K one, the rows taken
+        in turn; at most six. An element whose steady value is zero is left out."""
         if self.optimal is None:
             return np.zeros((0, 0)), np.zeros((0, 0))
         gains, values = self.optimal.gains, self.optimal.values
         count = min(self.problem.n, 6)
         pick = np.arange(count)
-        row = pick if gains.shape[1] > 1 else np.zeros(count, int)
+        row = pick % self.problem.m
         p, k = values[:, pick, pick], gains[:, row, pick]
         p_end, k_end = p[0], k[0]
         if self.steady:

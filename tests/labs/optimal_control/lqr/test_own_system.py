@@ -8,6 +8,7 @@ import pytest
 from scipy.linalg import solve_discrete_are
 
 from labs.errors import LabError, ParameterError
+from labs.optimal_control.lqr.lab import Lqr
 from labs.optimal_control.lqr.own_system import EXAMPLE, own_system
 from tests.labs.optimal_control.lqr.simulation import lqr_params, states
 
@@ -73,6 +74,21 @@ def test_it_is_regulated_as_scipy_says_and_steps_by_its_matrices() -> None:
         np.testing.assert_allclose(after, (np.array(A) + B @ K) @ before, atol=1e-12)
     np.testing.assert_array_equal(run[9].x, run[0].x)
     assert run[-1].past_cost < run[0].x @ P @ run[0].x
+
+
+@pytest.mark.parametrize("controls", [1, 2, 3, 4])
+def test_any_number_of_controls_goes(controls: int) -> None:
+    """Of three states; and where nothing but control costs, what is stable is left alone."""
+    b = "; ".join(" ".join(str(i + j + i * j) for j in range(controls)) for i in range(3))
+    text = f"A = 0.9 0.1 0; 0 0.8 0.1; 0 0 0.7\nB = {b}\nQ = 0\nR = 1\nx0 = 1 1 1"
+    params = lqr_params({"system": "own", "matrices": text, "period": 0.01})
+    law, state = params.regulator, states(params, 0.05)[-1]
+    assert Lqr().measure(params, state)["growth"] == pytest.approx(0.9)
+    assert law.mismatch <= 0.0
+    costly = lqr_params(params.model_dump() | {"matrices": text.replace("Q = 0", "Q = 1")})
+    p, k = costly.regulator.relative_to_steady()
+    np.testing.assert_allclose(p[0], 1.0, rtol=1e-6)
+    np.testing.assert_allclose(k[0], 1.0, rtol=1e-6)
 
 
 def test_continuous_time_is_held() -> None:

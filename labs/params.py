@@ -4,21 +4,36 @@ A lab's parameters are a frozen pydantic model whose fields are made by a `Group
 on a slider), `choice` (one of a few named values), `toggle` (on or off) or `text`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar, Self
 
-from pydantic import BaseModel, ConfigDict, ValidationError, field_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, field_validator
 from pydantic_core import ErrorDetails
 from pydantic_core.core_schema import ValidationInfo
 
-from labs.errors import ParameterError
+from labs.errors import LabError, ParameterError
 from labs.number_texts import LONGEST_NUMBER
 from labs.tunables import Choice, Effect, Group, Knob, Text, Toggle, Tunable, Value, When
 
 __all__ = [
     "Choice", "Effect", "Group", "Knob", "Params", "Text", "Toggle", "Tunable", "Value", "When",
+    "readable",
 ]  # fmt: skip
+
+
+def readable(read: Callable[[str], object]) -> AfterValidator:
+    """For the type of a text field, Annotated[str, readable(read)]: what `read` refuses with a
+    LabError is refused in the same words."""
+
+    def check(text: str) -> str:
+        try:
+            read(text)
+        except LabError as error:
+            raise ValueError(str(error)) from None
+        return text
+
+    return AfterValidator(check)
 
 
 class Params(BaseModel):

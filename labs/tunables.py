@@ -126,7 +126,8 @@ class Toggle(Tunable):
 @dataclass(frozen=True, kw_only=True)
 class Text(Tunable):
     """A short text, such as the rows of a table. What it must say, the lab's model validates:
-    with a `field_validator` that raises ValueError, its message a sentence that helps."""
+    by its type (`labs.params.readable`), or with a `field_validator` that raises ValueError, its
+    message a sentence that helps."""
 
     rows: int
     max_length: int

@@ -1,14 +1,13 @@
 """The tunables of integration: a pendulum, a step, and the two methods one can choose."""
 
 from functools import lru_cache
+from typing import Annotated
 
 import numpy as np
-from pydantic import field_validator
 
 from labs.algorithms.butcher_tableau import parse_tableau
-from labs.errors import LabError
 from labs.models.pendulums import Pendulum, pendulum
-from labs.params import Group, Params
+from labs.params import Group, Params, readable
 
 METHOD_TITLES = {
     "euler": "Euler",
@@ -67,22 +66,13 @@ class IntegrationParams(Params):
     """Of all methods alike. A pendulum stands still between two steps."""
     implicit: str = STEPPING.choice("implicit-midpoint", IMPLICIT_METHODS, "Implicit method")
     """Which one the gray pendulum follows; its stages are found by Newton's method."""
-    tableau: str = STEPPING.text(
+    tableau: Annotated[str, readable(parse_tableau)] = STEPPING.text(
         "0 |\n1/3 | 1/3\n2/3 | 0 2/3\n| 1/4 0 3/4", "Your tableau", rows=6, max_length=1500
     )
     """A row a stage, c | a ..., then | b ... at the end, or two of an embedded pair. Fractions go,
     and so do weights on and above the diagonal (implicit)."""
     pair: str = STEPPING.choice("first", PAIR, "Of a pair take")
     """Which row of b counts where your tableau has two."""
-
-    @field_validator("tableau")
-    @classmethod
-    def _is_a_tableau(cls, value: str) -> str:
-        try:
-            parse_tableau(value)
-        except LabError as error:
-            raise ValueError(str(error)) from None
-        return value
 
     @property
     def rods(self) -> int:

@@ -1,12 +1,9 @@
 """What the user turns about Markov chains: the chain, its probabilities, its costs, the walk."""
 
 from functools import lru_cache
+from typing import Annotated
 
-from pydantic import field_validator
-from pydantic_core.core_schema import ValidationInfo
-
-from labs.errors import LabError
-from labs.params import Group, Params
+from labs.params import Group, Params, readable
 from labs.reinforcement_learning.markov.chains import TITLES, chain_table, parse_rows
 from labs.reinforcement_learning.markov.reward_process import Edit, RewardProcess, reward_process
 from labs.tasks.mdp_table.table import parse_table
@@ -35,7 +32,7 @@ class MarkovParams(Params):
         1.0, 1.0, 41.0, "n", "", "Which random chain", step=1.0, key=True, when={"chain": "random"}
     )
     """Each number is another one of six states."""
-    table: str = CHAIN.text(
+    table: Annotated[str, readable(lambda text: parse_table(text, MAX_SHOWN_STATES))] = CHAIN.text(
         "state, cost, Sun, Rain, Snow\nSun, 0, 2/3, 1/3, 0\nRain, 1, 1/2, 1/4, 1/4\n"
         "Snow, 3, 0, 1/2, 1/2",
         "Your table",
@@ -53,7 +50,9 @@ class MarkovParams(Params):
         0.0, -1.0, 1.0, "s", "", "Shift it", step=0.01, key=True, when=EDITABLE
     )
     """Down to -1: never. Up to 1: always. The others of its row keep their proportions."""
-    rows: str = PROBABILITIES.text("", "Changed rows", rows=3, max_length=1000, when=EDITABLE)
+    rows: Annotated[str, readable(parse_rows)] = PROBABILITIES.text(
+        "", "Changed rows", rows=3, max_length=1000, when=EDITABLE
+    )
     """Beads that are dragged write here: a state and its weights, 1: 0 0.5 0.5. For chains without
     controls."""
     gamma: float = COSTS.knob(0.9, 0.0, 1.0, r"\gamma", "", "Discount", step=0.01, key=True)
@@ -65,15 +64,6 @@ class MarkovParams(Params):
     others share what is left."""
     pace: float = WALK.knob(1.5, 0.2, 200.0, r"1/T", "1/s", "Steps a second", scale="log", key=True)
     """Of the token."""
-
-    @field_validator("table", "rows")
-    @classmethod
-    def _can_be_read(cls, value: str, info: ValidationInfo) -> str:
-        try:
-            parse_rows(value) if info.field_name == "rows" else parse_table(value, MAX_SHOWN_STATES)
-        except LabError as error:
-            raise ValueError(str(error)) from None
-        return value
 
     @property
     def chosen_states(self) -> tuple[int, int]:

@@ -3,21 +3,10 @@
 from collections.abc import Mapping
 from typing import Annotated
 
-from pydantic import AfterValidator
-
 from labs.errors import LabError, ParameterError
-from labs.params import Value
+from labs.params import Value, readable
 from labs.tasks.grid_world.map import MAPS, GridWorld, grid_world
 from labs.tasks.grid_world.picture import BOARD, board
-
-
-def _is_a_map(text: str) -> str:
-    try:
-        grid_world(text, False)
-    except LabError as error:
-        raise ValueError(str(error)) from None
-    return text
-
 
 MAP_LENGTH = 2000
 """Characters: 32 rows of 32 cells, and some lines of costs."""
@@ -34,7 +23,7 @@ BOOK_WORLDS: Mapping[str, Mapping[str, Value]] = {
     },
 }  # fmt: skip
 """The worlds of many books and courses, for labs whose params have these names."""
-MapText = Annotated[str, AfterValidator(_is_a_map)]
+MapText = Annotated[str, readable(lambda text: grid_world(text, False))]
 """The type of a field of Params that holds a map; what is none is refused in a sentence."""
 
 

@@ -3,9 +3,7 @@
 from collections.abc import Mapping
 from typing import Annotated
 
-from pydantic import AfterValidator
-
-from labs.errors import LabError
+from labs.params import readable
 from labs.tasks.mdp_table.table import parse_table
 
 TAXICAB = """from, action, to, probability, reward
@@ -37,13 +35,5 @@ no radio."""
 TABLES: Mapping[str, str] = {"Taxicab": TAXICAB}
 
 
-def _is_a_table(text: str) -> str:
-    try:
-        parse_table(text)
-    except LabError as error:
-        raise ValueError(str(error)) from None
-    return text
-
-
-TableText = Annotated[str, AfterValidator(_is_a_table)]
+TableText = Annotated[str, readable(parse_table)]
 """The type of a field of Params that holds a table; what is none is refused in a sentence."""

@@ -44,6 +44,7 @@ from labs.reinforcement_learning.dynamic_programming.tasks import (
     warm_start,
 )
 from labs.scene import Scene
+from labs.tasks.grid_world.cells import CellWorld
 from labs.tasks.grid_world.map import MAPS, GridWorld, grid_world
 from labs.tasks.grid_world.params import BOOK_WORLDS, edit_map
 from labs.tasks.grid_world.picture import draw_board, draw_walkers, draw_way, value_span
@@ -234,10 +235,9 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         if mdp.terminal.any() and not mdp.can_end.all():
             about += f"\nFrom {int((~mdp.can_end).sum())} states no way leads to a goal."
         by_state = UNNAMED
-        if isinstance(place, GridWorld):
+        if isinstance(place, CellWorld):
             about = "\n".join([about, *place.notes])
-        elif isinstance(place, TableWorld):
-            about = "\n".join([about, *place.table.notes])
+        if isinstance(place, TableWorld):
             random = policy is None or policy[0] == RANDOM
             by_state = place.describe(V, None if random else policy)
         report = iteration_report(state.iterates, state.seconds)

@@ -27,6 +27,7 @@ from labs.reinforcement_learning.td_control.training import (
     transfer,
 )
 from labs.scene import Scene
+from labs.tasks.grid_world.cells import CellWorld
 from labs.tasks.grid_world.map import MAPS, GridWorld, grid_world
 from labs.tasks.grid_world.params import BOOK_WORLDS, edit_map
 from labs.tasks.grid_world.picture import draw_board, draw_walkers, draw_way, value_span
@@ -179,10 +180,9 @@ class TdControl(Lab[TdParams, TdState]):
     def notes(self, params: TdParams, state: TdState) -> Mapping[str, str]:
         task, (m, s), by_state = params.task, params.view, UNNAMED
         about = [task.mdp.report([task.start])]
-        if isinstance(task.place, GridWorld):
+        if isinstance(task.place, CellWorld):
             about += task.place.notes
-        elif isinstance(task.place, TableWorld):
-            about += task.place.table.notes
+        if isinstance(task.place, TableWorld):
             q = _current(params, state)["q"][m, s]
             by_state = task.place.describe(q.min(axis=1), q.argmin(axis=1))
         return {"about": "\n".join(about), "by_state": by_state}

@@ -39,6 +39,11 @@ class CellWorld(abc.ABC):
     def nominal(self) -> np.ndarray:
         """(X, U) int32: the next state, were nothing left to chance."""
 
+    @property
+    @abc.abstractmethod
+    def notes(self) -> tuple[str, ...]:
+        """What was understood otherwise than written, in sentences."""
+
     @cached_property
     def index(self) -> np.ndarray:
         """(rows, columns) int: the state of each cell, -1 where there is none."""

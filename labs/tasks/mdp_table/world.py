@@ -49,6 +49,10 @@ class TableWorld(CellWorld):
         elsewhere[:, np.arange(len(self.cells)), np.arange(len(self.cells))] -= 1e-9
         return np.asarray(elsewhere.argmax(axis=2).T, np.int32)
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return self.table.notes
+
     def mdp(self, gamma: float) -> FiniteMDP:
         """The table as an MDP."""
         return self.table.mdp(gamma)

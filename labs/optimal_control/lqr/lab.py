@@ -11,7 +11,7 @@ from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.models.plant import Force
 from labs.optimal_control.lqr.comparison import COMPARED_HORIZONS, HORIZON_COUNT, compare
 from labs.optimal_control.lqr.linear_systems import SIMULATION_STEP, LinearSystem
-from labs.optimal_control.lqr.own_system import OwnSystem
+from labs.optimal_control.lqr.own_system import OwnSystem, advance
 from labs.optimal_control.lqr.params import LqrParams
 from labs.optimal_control.lqr.picture import clip_norm, draw_regulated, draw_states
 from labs.optimal_control.lqr.plots import (
@@ -146,7 +146,7 @@ class Lqr(Lab[LqrParams, LqrState]):
         elif state.since_update + 1 < length:
             x = state.x
         else:
-            x = system.advance(state.x, state.u, params.period, force)
+            x = advance(regulator.problem, state.x, state.u, force)
         count = state.steps + 1
         if why := system.out_of_range(x):
             return replace(state, trouble=f"At t = {state.t:.2f} s {why}. {ADVICE}")

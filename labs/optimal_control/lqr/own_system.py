@@ -76,14 +76,6 @@ class OwnSystem:
         """A (n, n) and B (n, m) of one step of `period` [s]."""
         return zero_order_hold(self.a, self.b, period) if self.continuous else (self.a, self.b)
 
-    def advance(
-        self, x: np.ndarray, u: np.ndarray, period: float, force: Force | None = None
-    ) -> np.ndarray:
-        """x (n,) one step of `period` later under u (m,), to which a push adds its force [N]."""
-        a, b = self.linear(period)
-        push = force(np.zeros(3))[1] if force else 0.0
-        return np.asarray(a @ x + b @ (u + push))
-
     def phase_point(self, x: np.ndarray) -> np.ndarray:
         """(2,) its first numbers."""
         return np.asarray(np.resize(x, 2))
@@ -92,6 +84,15 @@ class OwnSystem:
         """Why it is followed no further, "it ..."; empty while it is."""
         most = LARGEST * max(1.0, float(np.abs(self.x0).max()))
         return "" if np.abs(x).max() <= most else f"its state passed {most:g}"
+
+
+def advance(
+    problem: LqrProblem, x: np.ndarray, u: np.ndarray, force: Force | None = None
+) -> np.ndarray:
+    """x (n,) one step later under u (m,), to which a push adds its force [N]; A and B of the step
+    are those of `problem`."""
+    push = force(np.zeros(3))[1] if force else 0.0
+    return np.asarray(problem.a @ x + problem.b @ (u + push))
 
 
 @lru_cache(maxsize=32)

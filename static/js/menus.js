@@ -4,19 +4,20 @@
 const GAP = 6;
 
 export function wireMenus() {
-  const openers = new Map(); // by the menu's id: the button pressed last
-  const opens = "[popovertarget]";
-  document.addEventListener("click", ({ target }) => {
-    const button = target.closest?.(opens);
-    if (button) openers.set(button.getAttribute("popovertarget"), button);
-  }, true);
-  for (const button of document.querySelectorAll(opens)) button.setAttribute("aria-expanded", "false");
   for (const menu of document.querySelectorAll(".menu[popover]")) {
-    menu.addEventListener("toggle", (event) => {
-      const button = openers.get(menu.id);
-      if (!button) return;
-      button.setAttribute("aria-expanded", String(event.newState === "open"));
-      if (event.newState === "open") place(menu, button);
+    const buttons = [...document.querySelectorAll(`[popovertarget="${menu.id}"]`)];
+    let opener = null; // the button pressed last
+    for (const button of buttons) {
+      button.setAttribute("aria-expanded", "false");
+      button.addEventListener("click", () => {
+        if (button !== opener) menu.hidePopover(); // the press opens it again, beside this one
+        opener = button;
+      });
+    }
+    menu.addEventListener("toggle", ({ newState }) => {
+      const open = newState === "open";
+      for (const button of buttons) button.setAttribute("aria-expanded", String(open && button === opener));
+      if (open) place(menu, opener);
     });
     menu.addEventListener("click", (event) => {
       if (menu.classList.contains("list") && event.target.closest("button")) menu.hidePopover();

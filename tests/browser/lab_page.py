@@ -123,6 +123,13 @@ class LabPage:
         expect(text).to_be_visible()
         return text.locator("xpath=ancestor::*[.//input or .//*[@role='slider']][1]")
 
+    def pause(self) -> None:
+        """Stops the clock, which runs."""
+        run = self.page.locator("#run")
+        expect(run).to_have_attribute("aria-pressed", "true")
+        run.click()
+        expect(run).to_have_attribute("aria-pressed", "false")
+
     def time(self) -> float:
         return float(self.page.locator("#clock span").inner_text())
 

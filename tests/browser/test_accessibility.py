@@ -39,14 +39,6 @@ def found(page: Page) -> list[str]:
     return faults
 
 
-def pause(lab: LabPage) -> None:
-    """axe-core measures anew after every drawing: while plots run, three times as long."""
-    run = lab.page.locator("#run")
-    expect(run).to_have_attribute("aria-pressed", "true")
-    run.click()
-    expect(run).to_have_attribute("aria-pressed", "false")
-
-
 def tree(page: Page) -> list[tuple[str, str, int]]:
     """What Chromium tells a screen reader, in its order: role, name, level of a heading."""
     nodes = page.context.new_cdp_session(page).send("Accessibility.getFullAXTree")["nodes"]
@@ -99,7 +91,7 @@ def test_the_pages(page: Page) -> None:
     expect(bars).to_have_attribute("aria-label", re.compile(r", bars\. \w+: .*; \w+: .*\."))
     page.locator(".experiment .try").first.click()
     expect(page.locator(".experiment.current")).to_be_visible()
-    pause(lab)
+    lab.pause()  # axe-core measures anew after every drawing: while plots run, three times as long
     assert found(page) == []
     check_tree(page, "Markov chains")
     lab.open("joint-control")
@@ -107,7 +99,7 @@ def test_the_pages(page: Page) -> None:
     expect(error).to_have_attribute(
         "aria-label", re.compile(r"^Error over time, .*joint 1: (from|constant) .* rad; .*joint 6")
     )
-    pause(lab)
+    lab.pause()
     assert found(page) == []
     check_tree(page, "Joint motion control")
     page.set_viewport_size({"width": 390, "height": 844})

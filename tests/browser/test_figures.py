@@ -3,7 +3,6 @@
 import csv
 import io
 import json
-from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -67,8 +66,7 @@ def check_picture(root: ElementTree.Element, png: bytes) -> None:
 def test_every_kind_of_plot_leaves_the_page(page: Page) -> None:
     page.emulate_media(color_scheme="dark")
     lab = LabPage(page, scene=False).open("oscillator", "?gain=25&noisy=true&seed=3")
-    page.get_by_role("button", name="Pause", exact=True).click()
-    lab.told(when=lambda status: not status["running"])
+    lab.pause()
     for title, least in DRAWN.items():
         lab.pin(title)
         lab.wait_filled(".plot:not([hidden])")
@@ -94,20 +92,36 @@ def test_every_kind_of_plot_leaves_the_page(page: Page) -> None:
             np.testing.assert_array_equal(cells, np.ravel(data["data"][data["z"]]))
         if title == "Position":
             assert [float(row[header.index("x")]) for row in rows] == data["data"]["x"]
-    name, svg = save(page, ALL, "svg")
-    root = ElementTree.fromstring(svg)
-    assert all(f"{title}" in words(root) for title in [*DRAWN, "Phase"]), "those on the shelf, too"
+    check_menu(page, lab)
+    svg = save(page, ALL, "svg")[1]
+    said = words(ElementTree.fromstring(svg))
+    assert all(title in said for title in [*DRAWN, "Phase"]), "those on the shelf, too"
     png = save(page, ALL, "png")[1]
     keep("figures.png", png)
-    check_picture(root, png)
+    check_picture(ElementTree.fromstring(svg), png)
     assert save(page, ALL, "csv")[0] == "oscillator-plots.zip"
     assert len(json.loads(save(page, ALL, "json")[1])["plots"]) == len(DRAWN) + 1
-    check_paper(page, lab.pin)
+    check_paper(page, lab)
 
 
-def check_paper(page: Page, pin: Callable[[str], object]) -> None:
+def check_menu(page: Page, lab: LabPage) -> None:
+    """Open at one plot, it goes to the other whose button is pressed."""
+    lab.pin("Bars")
+    lab.pin("Note")
+    bars, note = (page.get_by_role("button", name=f"Save {name}") for name in ("Bars", "Note"))
+    bars.click()
+    expect(bars).to_have_attribute("aria-expanded", "true")
+    note.click()
+    expect(note).to_have_attribute("aria-expanded", "true")
+    expect(bars).to_have_attribute("aria-expanded", "false")
+    expect(page.locator("#save-menu .hint")).to_have_text("Save “Note” as")
+    note.click()
+    expect(page.locator("#save-menu")).to_be_hidden()
+
+
+def check_paper(page: Page, lab: LabPage) -> None:
     """The article, and the pinned plots as figures; nothing that only a screen can use."""
-    pin("Position")
+    lab.pin("Position")
     page.emulate_media(media="print")
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     figure = page.locator("#printed svg")

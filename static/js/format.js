@@ -9,11 +9,15 @@ export function number(value, digits = 4) {
   const size = Math.abs(value);
   if (size >= 1e5 || size < 1e-3) {
     const [mantissa, exponent] = value.toExponential(Math.min(digits, 3) - 1).split("e");
-    const power = [...exponent.replace("+", "")].map((c) => SUPERSCRIPTS[c]).join("");
-    return `${minus(mantissa)}·10${power}`;
+    return `${minus(mantissa)}·10${raised(exponent)}`;
   }
   const decimals = Math.max(0, digits - 1 - Math.floor(Math.log10(size)));
   return minus(value.toFixed(Math.min(decimals, 4)));
+}
+
+// The digits of an exponent, "-7" or "+12", as superscripts.
+export function raised(exponent) {
+  return [...exponent.replace("+", "")].map((c) => SUPERSCRIPTS[c]).join("");
 }
 
 // As short as it goes without loss, for fields one types into.

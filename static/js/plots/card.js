@@ -1,8 +1,6 @@
 // The frame every plot stands in: a title with its unit, a place for a legend, the way to save it,
 // and a body.
 
-import { svg } from "./chart.js";
-
 export function card(title, unit = "", bodyClass = "canvas") {
   const section = element("section", "plot");
   const header = element("header");
@@ -17,8 +15,7 @@ export function card(title, unit = "", bodyClass = "canvas") {
   save.title = "Save this plot: picture or data";
   save.setAttribute("aria-label", `Save ${title}`);
   save.setAttribute("popovertarget", "save-menu");
-  save.append(svg("svg", { class: "icon", viewBox: "0 0 20 20", "aria-hidden": "true" }));
-  save.firstChild.append(svg("path", { d: "M10 3v9.5M6.3 9 10 12.7 13.7 9M4 16.5h12" }));
+  save.append(document.querySelector("#save-all .icon").cloneNode(true));
   header.append(heading, legend, save);
   const body = element("div", bodyClass);
   section.setAttribute("aria-label", title);

@@ -19,7 +19,7 @@ export class Chart {
   // Clears; tells its size and that of its letters [px].
   clear() {
     const { clientWidth: width, clientHeight: height } = this.body;
-    this.em = 0.75 * parseFloat(getComputedStyle(document.documentElement).fontSize);
+    this.em = em();
     this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     this.svg.replaceChildren();
     return { width, height, em: this.em };
@@ -27,8 +27,8 @@ export class Chart {
 
   // Clears, and draws axes for the ranges; `xNames` are those of the ticks 1, 2, 3. `square` gives
   // both axes the same scale, `downward` turns that of y over, `whole` leaves fractions out, `right`
-  // leaves room beside the area.
-  // On a logarithmic axis the range is of logarithms to the base 10, as are all places drawn.
+  // leaves room [em] beside the area. On a logarithmic axis the range is of logarithms to the base
+  // 10, as are all places drawn.
   begin([x0, x1], [y0, y1], {
     square = false, downward = false, whole = false, xTicks = null, xNames = null, xLabel = "", yLabel = "",
     logX = false, logY = false, right = 0, grid = true,
@@ -45,7 +45,7 @@ export class Chart {
     // As wide as the longest number, so that none is cut off: digits are 0.56 em wide or less.
     const digits = Math.max(...yTicks(y0, y1).map((v) => yText(v).length), 3);
     const left = (0.9 + 0.56 * Math.min(digits, 12)) * em + (yLabel ? 1.6 * em : 0);
-    this.area = { left, top: 0.7 * em, width: Math.max(1, width - left - em - right), height: tall };
+    this.area = { left, top: 0.7 * em, width: Math.max(1, width - left - (1 + right) * em), height: tall };
     if (square) {
       const perPixel = Math.max((x1 - x0) / this.area.width, (y1 - y0) / this.area.height);
       [x0, x1] = about((x0 + x1) / 2, perPixel * this.area.width);
@@ -108,6 +108,11 @@ export class Chart {
   add(name, attributes) {
     return this.svg.appendChild(svg(name, attributes));
   }
+}
+
+// The size of a chart's letters [px].
+export function em() {
+  return 0.75 * parseFloat(getComputedStyle(document.documentElement).fontSize);
 }
 
 export function svg(name, attributes) {

@@ -24,8 +24,8 @@ export class Curves {
     this.xLabel = fill(this.plot.x_label, fields);
     this.yLabel = fill(this.plot.y_label, fields);
     // A logarithm has no place for what is negative: the axis is then linear.
-    const negative = this.plot.traces.some(({ y }) => (fields[y] ?? []).flat().some((v) => v < 0));
-    this.logY = this.plot.log_y && !negative;
+    const negative = ({ y }) => (fields[y] ?? []).flat().some((v) => v < 0);
+    this.logY = this.plot.log_y && !this.plot.traces.some(negative);
     this.curves = this.plot.traces.flatMap((trace) => this.expand(trace, fields));
     this.marked = new Set(this.curves.map(({ series }) => series).filter(Boolean)).size > 1;
     this.updateLegend();

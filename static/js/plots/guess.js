@@ -12,11 +12,16 @@ export function guessedValues(guess, low, high) {
   return low <= high ? values.filter((v) => v > low - reach && v < high + reach) : values;
 }
 
+// Its lines over times [from, to], each of [t, value].
+export function guessedLines({ levels, x, y }, from, to) {
+  return levels?.map((level) => [[from, level], [to, level]]) ?? [x.map((t, i) => [t, y[i]])];
+}
+
 export function drawGuess(u, guess) {
   if (!guess) return;
   const { ctx, bbox } = u;
   const { min, max } = u.scales.x;
-  const lines = guess.levels?.map((level) => [[min, level], [max, level]]) ?? [guess.x.map((t, i) => [t, guess.y[i]])];
+  const lines = guessedLines(guess, min, max);
   const bottom = bbox.top + bbox.height;
   const place = (v) => Math.min(bottom, Math.max(bbox.top, u.valToPos(v, "y", true)));
   ctx.save();

@@ -7,7 +7,7 @@ import { card, element } from "./card.js";
 import { Chart } from "./chart.js";
 import { fill } from "./labels.js";
 import { extent, sentences } from "./summary.js";
-import { around, label, ticks } from "./ticks.js";
+import { around, bounds, label, ticks } from "./ticks.js";
 
 // The colours of values in the scene too (labs/colors.py), from the least to the largest.
 const SEQUENTIAL = ["#2b2459", "#363d7d", "#3d589e", "#3477a0", "#35949d", "#56ad8f", "#82c381", "#bcd67c", "#f2e873"];
@@ -52,14 +52,12 @@ export class HeatMap {
     if (!this.data) return;
     const { x, y, z, arrows } = this.data;
     const [xEdges, yEdges] = [edges(x), edges(y)];
-    const ends = (all) => [Math.min(...all), Math.max(...all)];
     const range = this.range(z);
     const [xLabel, yLabel, zLabel] = this.labels;
     const whole = [...x, ...y].every(Number.isInteger);
     const scale = ticks(...range, chart.body.clientHeight / 48);
-    const { em } = chart.clear();
-    const right = (2.2 + 0.56 * Math.max(...scale.map((v) => label(v).length), 2) + (zLabel ? 1.6 : 0)) * em;
-    chart.begin(ends(xEdges), ends(yEdges), { xLabel, yLabel, downward: this.plot.downward, whole, right, grid: false });
+    const right = 2.2 + 0.56 * Math.max(...scale.map((v) => label(v).length), 2) + (zLabel ? 1.6 : 0);
+    chart.begin(bounds(xEdges), bounds(yEdges), { xLabel, yLabel, downward: this.plot.downward, whole, right, grid: false });
     z.forEach((row, i) => {
       const [top, bottom] = [chart.y(yEdges[i]), chart.y(yEdges[i + 1])].sort((a, b) => a - b);
       const tones = row.map((value) => tone(value, range));
@@ -75,13 +73,8 @@ export class HeatMap {
 
   // Of the values there are; a constant stands in its middle.
   range(z) {
-    let [low, high] = [Infinity, -Infinity];
-    for (const value of z.flat()) {
-      if (!Number.isFinite(value)) continue;
-      if (value < low) low = value;
-      if (value > high) high = value;
-    }
-    return high > low ? [low, high] : around(low <= high ? [low] : []);
+    const [low, high] = bounds(z.flat());
+    return high > low ? [low, high] : around([low]);
   }
 
   // The value under the pointer.

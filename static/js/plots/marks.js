@@ -1,7 +1,7 @@
 // What tells the series apart besides colour: a mark each, on its curve and in the legend; and the
 // dashes, which tell kinds of lines apart.
 
-const SVG = "http://www.w3.org/2000/svg";
+import { svg } from "./chart.js";
 
 // By series, from 1: disc, square, triangle, diamond, triangle on its tip, plus, cross, hourglass.
 const SHAPES = [
@@ -37,12 +37,12 @@ export function drawMark(ctx, series, x, y, rim) {
 
 // The place of a legend's entry: a piece of its line, with its mark if it has one.
 export function swatch(style, tone, series = 0) {
-  const svg = make("svg", { class: "swatch", viewBox: "-10 -5 20 10", "aria-hidden": "true" });
-  svg.style.setProperty("--tone", tone);
-  if (style === "area") svg.append(make("rect", { x: -9, y: -4, width: 18, height: 8, rx: 1.5 }));
-  else if (style !== "points") svg.append(make("line", { x1: -10, x2: 10, y1: 0, y2: 0, class: style }));
-  if (series || style === "points") svg.append(make("path", { d: outline(series) }));
-  return svg;
+  const made = svg("svg", { class: "swatch", viewBox: "-10 -5 20 10", "aria-hidden": "true" });
+  made.style.setProperty("--tone", tone);
+  if (style === "area") made.append(svg("rect", { x: -9, y: -4, width: 18, height: 8, rx: 1.5 }));
+  else if (style !== "points") made.append(svg("line", { x1: -10, x2: 10, y1: 0, y2: 0, class: style }));
+  if (series || style === "points") made.append(svg("path", { d: outline(series) }));
+  return made;
 }
 
 // Where the marks of a polyline of places [x, y] go: every so many pixels along it, counted
@@ -62,10 +62,4 @@ export function placesAlong(places, series, every = 90) {
     gone += length;
   }
   return found;
-}
-
-function make(name, attributes) {
-  const made = document.createElementNS(SVG, name);
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  return made;
 }

@@ -50,8 +50,9 @@ export class Matrix {
     const high = (this.figureHeight() - 0.6 * em) / texts.length;
     const longest = (column) => Math.max(...texts.map((row) => row[column].length));
     const widths = texts[0].map((_, j) => (0.62 * longest(j) + 1) * em);
-    const shrink = Math.min(1, (width - 2 * em) / widths.reduce((a, b) => a + b));
-    let left = (width - shrink * widths.reduce((a, b) => a + b)) / 2;
+    const whole = widths.reduce((a, b) => a + b);
+    const shrink = Math.min(1, (width - 2 * em) / whole);
+    let left = (width - shrink * whole) / 2;
     const side = (x) => chart.add("line", { x1: x, x2: x, y1: 0.3 * em, y2: 0.3 * em + texts.length * high, class: "side" });
     widths.forEach((full, j) => {
       const wide = shrink * full;
@@ -64,7 +65,7 @@ export class Matrix {
           chart.add("rect", { x: left + 0.5, y: y + 0.5, width: wide - 1, height: high - 1, style });
         }
         const text = chart.text(left + wide - 0.5 * shrink * em, y + high / 2 + 0.35 * em, row[j], "end");
-        text.setAttribute("class", named && !j ? "row-name" : "digits");
+        if (level >= 0) text.setAttribute("class", "digits");
         text.style.fontSize = `${shrink * em}px`;
       });
       left += wide;

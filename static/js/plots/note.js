@@ -2,6 +2,7 @@
 
 import { wrapped } from "../figures/words.js";
 import { card, element } from "./card.js";
+import { em } from "./chart.js";
 
 export class Note {
   constructor(plot) {
@@ -17,18 +18,21 @@ export class Note {
     this.body.replaceChildren(...text.split("\n").map((line) => element("p", "", line)));
   }
 
-  // In lines as wide as a figure.
+  // In lines of a figure as wide as this [px].
+  lines(width) {
+    return wrapped(this.text ?? "", width - 2 * em());
+  }
+
   paint(chart) {
     const { width, em } = chart.clear();
-    wrapped(this.text ?? "", width - 2 * em).forEach((line, i) => {
+    this.lines(width).forEach((line, i) => {
       chart.text(em, (1.2 + 1.5 * i) * em, line, "start").setAttribute("class", "sentence");
     });
   }
 
   // [px] of it as vectors.
   figureHeight(width) {
-    const em = 0.75 * parseFloat(getComputedStyle(document.documentElement).fontSize);
-    return (wrapped(this.text ?? "", width - 2 * em).length * 1.5 + 0.7) * em;
+    return (this.lines(width).length * 1.5 + 0.7) * em();
   }
 
   clear() {}

@@ -2,7 +2,9 @@
 // the page.
 
 import { areas, ghostSamples } from "./beneath.js";
+import { guessedLines } from "./guess.js";
 import { outline, placesAlong } from "./marks.js";
+import { bounds } from "./ticks.js";
 
 export function paintTimeSeries(plot, chart) {
   const [from, to] = plot.board.range();
@@ -27,7 +29,7 @@ export function paintTimeSeries(plot, chart) {
         chart.add("path", { d: outline(curve.series), transform: `translate(${x.toFixed(1)} ${y.toFixed(1)})`, class: "point tone", style: tone(curve) });
       }
     });
-    if (plot.guess) paintGuess(chart, plot.guess, [from, to]);
+    if (plot.guess) paintGuess(chart, guessedLines(plot.guess, from, to));
   });
 }
 
@@ -35,19 +37,15 @@ export function paintTimeSeries(plot, chart) {
 function verticalRange(plot, data) {
   const { min, max } = plot.uplot?.scales.y ?? {};
   if (plot.visible && Number.isFinite(min)) return [min, max];
-  let [low, high] = [Infinity, -Infinity];
+  let ends = [Infinity, -Infinity];
   plot.curves.forEach((curve, i) => {
     if (!plot.shows(curve) || curve.line.style === "limit" || plot.isArea(curve.line)) return;
-    for (const value of data[i + 1]) {
-      if (value < low) low = value;
-      if (value > high) high = value;
-    }
+    ends = bounds(data[i + 1], ends);
   });
-  return plot.range(low, high, data);
+  return plot.range(...ends, data);
 }
 
-function paintGuess(chart, guess, [from, to]) {
-  const lines = guess.levels?.map((level) => [[from, level], [to, level]]) ?? [guess.x.map((t, i) => [t, guess.y[i]])];
+function paintGuess(chart, lines) {
   for (const line of lines) polyline(chart, line, "curve guess", "");
   const { left, top, width } = chart.area;
   const end = Math.max(top + 2 * chart.em, chart.y(lines[0].at(-1)[1]));

@@ -1,19 +1,14 @@
 // Plots in words, for those who do not see them: what is drawn over what, and in which range.
 
 import { number } from "../format.js";
+import { bounds } from "./ticks.js";
 
 // "from −0.1 to 0.3, last 0.2": of numbers among which some may be missing.
 export function extent(values) {
-  let [low, high, last] = [Infinity, -Infinity, null];
-  for (const value of values) {
-    if (!Number.isFinite(value)) continue;
-    low = Math.min(low, value);
-    high = Math.max(high, value);
-    last = value;
-  }
-  if (last === null) return "no values";
+  const [low, high] = bounds(values);
+  if (low > high) return "no values";
   if (low === high) return `constant ${number(low, 3)}`;
-  return `from ${number(low, 3)} to ${number(high, 3)}, last ${number(last, 3)}`;
+  return `from ${number(low, 3)} to ${number(high, 3)}, last ${number(values.findLast(Number.isFinite), 3)}`;
 }
 
 // A heading, and a sentence of each of some parts; of many, how many more there are.

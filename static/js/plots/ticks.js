@@ -1,10 +1,21 @@
 // Ranges of axes, and the round numbers on them.
 
+import { raised } from "../format.js";
+
+// The least and the largest of finite values and of those before; without any Infinity, -Infinity.
+export function bounds(values, [low, high] = [Infinity, -Infinity]) {
+  for (const value of values) {
+    if (!Number.isFinite(value)) continue;
+    if (value < low) low = value;
+    if (value > high) high = value;
+  }
+  return [low, high];
+}
+
 // The range of finite values, a little wider, and never empty.
 export function around(values, { zero = false } = {}) {
-  const finite = values.filter(Number.isFinite);
-  let low = Math.min(...finite, ...(zero || !finite.length ? [0] : []));
-  let high = Math.max(...finite, ...(zero || !finite.length ? [0] : []));
+  let [low, high] = bounds(values, zero ? [0, 0] : undefined);
+  if (low > high) [low, high] = [0, 0];
   // A constant does not fill the frame with its rounding.
   const size = Math.max(Math.abs(low), Math.abs(high));
   if (high - low < 1e-5 * size) [low, high] = [low - 0.5 * size, high + 0.5 * size];
@@ -53,8 +64,7 @@ export function power(exponent) {
   const value = Number((10 ** exponent).toPrecision(3));
   if (Math.abs(exponent) < 4) return label(value);
   const [mantissa, tens] = value.toExponential().split("e");
-  const raised = tens.replace("+", "").replace(/[-0-9]/g, (c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]);
-  return `${mantissa === "1" ? "" : `${mantissa}·`}10${raised}`;
+  return `${mantissa === "1" ? "" : `${mantissa}·`}10${raised(tens)}`;
 }
 
 // A tick's number in words.

@@ -16,6 +16,7 @@ import { colour, SERIES } from "./palette.js";
 import { paintTimeSeries } from "./paint_time_series.js";
 import { extent, sentences } from "./summary.js";
 import { symbol } from "./symbol.js";
+import { bounds } from "./ticks.js";
 
 const DENSITY = 3; // samples a pixel that are worth drawing
 const READ_OUT_EVERY = 100; // [ms]
@@ -153,6 +154,7 @@ export class TimeSeries {
 
   // On the chart of a figure, where the page has uPlot's.
   paint(chart) {
+    if (!this.board.run) return;
     if (!this.uplot) {
       this.choose();
       this.setUnit(this.unit);
@@ -164,20 +166,9 @@ export class TimeSeries {
   // The y range: the curves and the ghost, and a limit once a curve comes near it. It grows at
   // once but shrinks only when much of it is empty, so that it does not tremble.
   range(low, high, data) {
-    const [from, to] = this.board.range();
     if (low === null || low === undefined) [low, high] = [Infinity, -Infinity];
-    for (const { from, to } of areas(this, data)) {
-      for (const value of [...from, ...to]) {
-        if (value < low) low = value;
-        if (value > high) high = value;
-      }
-    }
-    for (const samples of ghostSamples(this, from, to)) {
-      for (const value of samples.y) {
-        if (value < low) low = value;
-        if (value > high) high = value;
-      }
-    }
+    for (const { from, to } of areas(this, data)) [low, high] = bounds(to, bounds(from, [low, high]));
+    for (const { y } of ghostSamples(this, ...this.board.range())) [low, high] = bounds(y, [low, high]);
     const guessed = guessedValues(this.guess, low, high);
     [low, high] = [Math.min(low, ...guessed), Math.max(high, ...guessed)];
     if (!(low <= high)) return [-1, 1];

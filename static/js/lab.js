@@ -63,7 +63,7 @@ const actions = {
   faster: () => transport.faster(1),
   slower: () => transport.faster(-1),
   clear: () => board.clear(),
-  share: () => copy(new URL(link, location.href).href, "Link copied: it opens this lab with these parameters."),
+  share: () => copy(address(), "Link copied: it opens this lab with these parameters."),
   command: copyCommand,
   full: () => stage.fullScreen(),
   view: () => send({ command: "reset_view" }),
@@ -71,11 +71,15 @@ const actions = {
   experiment: (i) => experiments.start(i),
 };
 
+// Where the page opens as it is now.
+function address() {
+  return new URL(link, location.href).href;
+}
+
 // What a figure says beneath its plots.
 function aboutFigure() {
   const iteration = solver.status?.iteration;
-  const address = new URL(link, location.href).href;
-  return { lab, params: knobs.values, seed: session.want.seed, t: board.time, iteration, link: address };
+  return { lab, params: knobs.values, seed: session.want.seed, t: board.time, iteration, link: address() };
 }
 
 async function copyCommand() {

@@ -7,7 +7,7 @@ import { unitUnder } from "../knob_row.js";
 import { element } from "../plots/card.js";
 import { Chart, svg } from "../plots/chart.js";
 import { symbol } from "../plots/symbol.js";
-import { entry, flow } from "./flow.js";
+import { entry, flow, words } from "./flow.js";
 import { freeze } from "./vectors.js";
 import { piecesOf } from "./words.js";
 
@@ -32,7 +32,7 @@ export function figure(plots, about, columns = Math.min(2, plots.length)) {
     let top = Math.max(...ends);
     top += caption(root, about, [MARGIN, top - 0.5 * GAP], whole - 2 * MARGIN) - 0.5 * GAP + MARGIN;
     const title = svg("title", {});
-    title.textContent = [about.lab.title, ...plots.map(({ plot }) => plot.title)].join(": ").replaceAll(/: (?=.*: )/g, ": ");
+    title.textContent = [about.lab.title, ...plots.map(({ plot }) => plot.title)].join(": ");
     const link = svg("desc", {});
     link.textContent = about.link;
     root.prepend(title, link);
@@ -72,8 +72,8 @@ function entriesOf({ legend }) {
   const said = [...legend.children].filter((one) => one.getAttribute("aria-pressed") !== "false");
   return said.map((one) => {
     if (one.localName === "math") return entry(piecesOf(one));
-    const words = [...one.childNodes].filter((node) => !["svg", "output"].includes(node.localName));
-    const pieces = words.flatMap((node) => (node.localName === "math" ? piecesOf(node) : [{ text: ` ${node.textContent}`, plain: true }]));
+    const nodes = [...one.childNodes].filter((node) => !["svg", "output"].includes(node.localName));
+    const pieces = nodes.flatMap((node) => (node.localName === "math" ? piecesOf(node) : [words(` ${node.textContent}`)]));
     if (pieces[0]?.plain) pieces[0].text = pieces[0].text.trimStart();
     return entry(pieces, one.querySelector("svg"));
   });
@@ -81,17 +81,16 @@ function entriesOf({ legend }) {
 
 // The lab, what its parameters are, and when; tells how high that is.
 function caption(root, { lab, params, seed, t, iteration }, [x, y], width) {
-  const plain = (text, tone = "") => entry([{ text, plain: true }], null, tone);
   const where = [`${lab.title}, notes ${lab.section}`, lab.has_world ? `t = ${+t.toFixed(4)} s` : "", iteration ? `iteration ${iteration}` : "", `seed ${seed}`, `orclab ${lab.version}`];
   const set = lab.params.filter((tunable) => tunable.name in params && acts(tunable, params));
   const values = set.map((tunable) => {
-    const name = tunable.mathml ? piecesOf(symbol(tunable.mathml)) : [{ text: tunable.label || tunable.name, plain: true }];
+    const name = tunable.mathml ? piecesOf(symbol(tunable.mathml)) : [words(tunable.label || tunable.name)];
     const value = params[tunable.name];
     const unit = tunable.kind === "knob" ? unitUnder(tunable, params) : "";
     const text = ` = ${inWords(tunable, value)} ${unit}`.trimEnd();
-    return entry([...name, { text, plain: true }], null, value === tunable.default ? "muted" : "");
+    return entry([...name, words(text)], null, value === tunable.default ? "muted" : "");
   });
-  const first = flow(root, where.filter(Boolean).map((text) => plain(text)), [x, y], width, { size: 11 });
+  const first = flow(root, where.filter(Boolean).map((text) => entry([words(text)])), [x, y], width, { size: 11 });
   return first + flow(root, values, [x, y + first], width, { size: 11 });
 }
 

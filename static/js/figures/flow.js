@@ -5,7 +5,11 @@ import { svg } from "../plots/chart.js";
 const SPACE = 14; // [px] between entries
 const MATH = "'Times New Roman', Times, serif"; // not the page's: a picture has none but the system's
 
-// `pieces` are {text, italic, level} of a formula, or {text, plain} in words.
+// A piece of an entry in words; those of a formula are {text, italic, level}.
+export function words(text) {
+  return { text, plain: true };
+}
+
 export function entry(pieces, swatch = null, tone = "") {
   return { pieces, swatch, tone };
 }
@@ -40,7 +44,7 @@ export function flow(root, entries, [x, y], width, { size, indent = 0, right = f
 
 function draw(root, { pieces, swatch, tone }, size) {
   const group = root.appendChild(svg("g", {}));
-  const text = svg("text", { class: `entry ${tone}`, "font-size": size });
+  const text = svg("text", { class: `entry ${tone}` });
   text.style.fontSize = `${size}px`;
   let wide = 0;
   if (swatch) {

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from labs.engine.plot_data import named_values
 from labs.engine.run import World
 from labs.plots import field_names, label_names
 from server.messages import Hello, Status, Telemetry, View
@@ -150,11 +151,7 @@ class Broadcast:
         fields = None
         wanted = controls.viewers and self._fields and not controls.failure
         if wanted and self._is_due("fields", now, FIELDS):
-            known: dict[str, np.ndarray | str | tuple[str, ...]] = {
-                **world.lab.fields(world.params, world.state),
-                **world.lab.notes(world.params, world.state),
-                **world.lab.labels(world.params),
-            }
+            known = named_values(world)
             fields = {name: known[name] for name in self._fields if name in known}
         now_row = None if len(rows) else self._current_row()
         if len(rows):

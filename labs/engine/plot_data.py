@@ -61,11 +61,7 @@ class PlotData:
             raise LabError(f"no plot is named {unknown[0]!r}; there are {', '.join(shown)}")
         params = world.params.model_dump()
         wanted = [shown[t] for t in titles] or [p for p in shown.values() if is_shown(p, params)]
-        known: dict[str, Any] = {
-            **world.lab.fields(world.params, world.state),
-            **world.lab.notes(world.params, world.state),
-            **world.lab.labels(world.params),
-        }
+        known = named_values(world)
         channels = world.recorder.channels()
         about = {
             "lab": world.entry.slug,
@@ -104,6 +100,15 @@ class PlotData:
     def write(self, form: str) -> bytes:
         """`form` is "csv", "json" or "zip"."""
         return {"csv": self.csv, "json": self.json, "zip": self.zip}[form]()
+
+
+def named_values(world: World) -> dict[str, np.ndarray | str | tuple[str, ...]]:
+    """Fields, notes and labels as they are now: what plots show besides measured channels."""
+    return {
+        **world.lab.fields(world.params, world.state),
+        **world.lab.notes(world.params, world.state),
+        **world.lab.labels(world.params),
+    }
 
 
 def file_name(title: str) -> str:

@@ -10,7 +10,7 @@ from labs.compiled import on_compilation
 from labs.engine.catalog import Entry, catalog
 from labs.errors import LabError
 from labs.models.arms import ARMS, load
-from server import meshes
+from server import fork_server, meshes
 
 WHAT = "compiling the solvers, once; this may take a minute ..."
 PATIENCE = 1.0
@@ -50,6 +50,7 @@ def _entries() -> list[Entry]:
         sys.exit(1)  # the web process finds it too, and says it
 
 
+fork_server.endure_broken_requests()
 _prepare()
 for _name in ARMS:
     _arm = load(_name)

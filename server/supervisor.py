@@ -232,8 +232,8 @@ class Supervisor:
         return Worker(process, ours, self.clock)
 
     async def _begin(self, process: BaseProcess) -> None:
-        """A fork server that ends, as it does when a request of it was broken off, refuses others
-        until it is gone; then `start` begins another."""
+        """A fork server that was killed refuses requests until it is gone; then `start` begins
+        another."""
         for _ in range(REFUSALS):
             with contextlib.suppress(ConnectionError, EOFError):
                 return await _on_a_thread(process.start)

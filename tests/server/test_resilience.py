@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -45,6 +46,25 @@ def test_a_killed_fork_server_takes_nothing_down(mortal: Served) -> None:
         assert stream.next("notice")["state"] == "recovering"
         assert stream.next("notice")["state"] == "live"
         assert stream.next("status", lambda s: s["t"] > 0.1)
+
+
+def test_a_request_broken_off_leaves_the_fork_server_and_its_workers(mortal: Served) -> None:
+    with mortal.session("oscillator") as session, session.stream() as stream:
+        until(lambda: mortal.health()["spares"] == 1)
+        workers = set(mortal.listeners())
+        (fork_server,) = {psutil.Process(worker).ppid() for worker in workers}
+        sockets = psutil.Process(fork_server).net_connections("unix")
+        (address,) = {found.laddr for found in sockets if "listener-" in str(found.laddr)}
+        for _ in range(3):
+            with socket.socket(socket.AF_UNIX) as client:
+                client.connect(address)
+        before = stream.next("status")["t"]
+        assert stream.next("status", lambda s: s["t"] > before + 0.3)
+        assert set(mortal.listeners()) == workers
+    until(lambda: mortal.health()["sessions"] == 0)
+    with mortal.session("oscillator"):
+        until(lambda: mortal.health()["spares"] == 1)
+        assert {psutil.Process(worker).ppid() for worker in mortal.listeners()} == {fork_server}
 
 
 def test_a_hung_lab_is_replaced_and_then_given_up(served: Served) -> None:

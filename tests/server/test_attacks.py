@@ -147,9 +147,9 @@ def test_out_of_descriptors_is_a_refusal_and_passes(mortal: Served) -> None:
         pass
     until(lambda: mortal.health()["sessions"] == 0 and mortal.health()["spares"] == 1)
     mortal.http.get("/healthz")
-    for _ in range(3):
+    for free in range(-2, 6):  # the step at which it runs out differs
         try:
-            web.rlimit(psutil.RLIMIT_NOFILE, (web.num_fds() - 2, hard))
+            web.rlimit(psutil.RLIMIT_NOFILE, (web.num_fds() + free, hard))
             answer = mortal.http.post("/api/sessions", json={"lab": "oscillator"})
             if answer.status_code == 201:  # the spare; the next has none
                 mortal.http.delete(f"/api/sessions/{answer.json()['id']}")

@@ -103,14 +103,7 @@ class Dqn(Lab[DqnParams, DqnState]):
         task, options, training = params.task, params.options, state.training
         begun, wanted, i, done = _steps(training), round(params.steps), 0, ""
         while not done:
-            work = train(task, options, training)
-            while True:
-                try:
-                    next(work)
-                except StopIteration as finished:
-                    after, i = finished.value, i + 1
-                    break
-                yield None
+            after, i = (yield from train(task, options, training)), i + 1
             if not sound(after):
                 yield Snapshot(i, training, DIVERGED)
                 return

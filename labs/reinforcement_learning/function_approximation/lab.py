@@ -93,14 +93,7 @@ class FunctionApproximation(Lab[ApproximationParams, ApproximationState]):
         subject, training, done, i = SUBJECTS[params.world], state.training, "", 0
         last = 1 if _unit(params) == "solutions" else ITERATIONS
         while not done:
-            work = subject.learn(params, training)
-            while True:
-                try:
-                    next(work)
-                except StopIteration as finished:
-                    training, i = finished.value, i + 1
-                    break
-                yield None
+            training, i = (yield from subject.learn(params, training)), i + 1
             if not training["sound"]:
                 done = "The weights left all bounds."
             elif i == last:

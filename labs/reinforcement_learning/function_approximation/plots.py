@@ -26,6 +26,15 @@ def _map(title: str, z: str, z_label: str, when: When = PLANE, arrows: str = "")
     return HeatMap(title, "angle", "velocity", z, *AXES, z_label, when=when, arrows=arrows)
 
 
+def _band(name: str, label: str) -> tuple[Trace, ...]:
+    """What `spread` makes of the learners' curves."""
+    return (
+        Trace("steps", name, label, series=1),
+        Trace("steps", f"{name}_low", "", "dash", series=1),
+        Trace("steps", f"{name}_high", "", "dash", series=1),
+    )
+
+
 PLOTS: tuple[Plot, ...] = (
     Curves(
         "Value along the line",
@@ -41,9 +50,7 @@ PLOTS: tuple[Plot, ...] = (
         "Value error",
         "{unit}",
         "root mean square",
-        Trace("steps", "error", "mean of six", series=1),
-        Trace("steps", "error_low", "", "dash", series=1),
-        Trace("steps", "error_high", "", "dash", series=1),
+        *_band("error", "mean of six"),
         Trace("reference_x", "reference_best", "best fit", "dash", series=3),
         Trace("reference_x", "reference_fixed", "TD fixed point", "dash", series=2),
         Trace("squares_x", "squares", "least squares of the batch", "dash"),
@@ -54,9 +61,7 @@ PLOTS: tuple[Plot, ...] = (
         "Error of all values",
         "updates",
         "root mean square",
-        Trace("steps", "error", "mean of six", series=1),
-        Trace("steps", "error_low", "", "dash", series=1),
-        Trace("steps", "error_high", "", "dash", series=1),
+        *_band("error", "mean of six"),
         log_y=True,
         when=EXAMPLES,
     ),
@@ -69,9 +74,7 @@ PLOTS: tuple[Plot, ...] = (
         "Cost of the greedy policy",
         "{unit}",
         "J from hanging",
-        Trace("steps", "greedy", "median of six", series=1),
-        Trace("steps", "greedy_low", "", "dash", series=1),
-        Trace("steps", "greedy_high", "", "dash", series=1),
+        *_band("greedy", "median of six"),
         Trace("reference_x", "optimum", "optimal", "dash"),
         log_y=True,
         when=SWING,

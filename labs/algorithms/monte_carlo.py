@@ -15,7 +15,7 @@ those that the earlier steps left."""
 
 import numpy as np
 
-from labs.compiled import compiled
+from labs.compiled import compiled, inlined
 from labs.problems.episodes import UpdateRule, step_size
 from labs.problems.prediction import Episode
 
@@ -43,7 +43,7 @@ def every_visit(
     """Every-visit Monte Carlo."""
     if ended:
         costs_to_go(gamma, episode, T, 0.0)
-        move_to_returns(episode, 0, T, rule, V, N)
+        move_to_returns(episode, T, rule, V, N)
 
 
 @compiled
@@ -65,19 +65,25 @@ def first_visit(
         x = episode.states[t]
         if not seen[x]:
             seen[x] = True
-            N[x] += 1
-            V[x] += step_size(rule, N[x]) * (episode.returns[t] - V[x])
+            move(rule, V, N, V, x, episode.returns[t])
 
 
 @compiled
 def move_to_returns(
-    episode: Episode, begin: int, end: int, rule: UpdateRule, V: np.ndarray, N: np.ndarray
+    episode: Episode, T: int, rule: UpdateRule, V: np.ndarray, N: np.ndarray
 ) -> None:
-    """Moves the value of each state of the steps begin..end-1 towards its return."""
+    """Moves the value of each state of an episode towards its return."""
     learned = V.copy() if rule.offline else V
-    for t in range(begin, end):
-        x = episode.states[t]
-        N[x] += 1
-        learned[x] += step_size(rule, N[x]) * (episode.returns[t] - V[x])
+    for t in range(T):
+        move(rule, V, N, learned, episode.states[t], episode.returns[t])
     if rule.offline:
         V[:] = learned
+
+
+@inlined
+def move(
+    rule: UpdateRule, V: np.ndarray, N: np.ndarray, learned: np.ndarray, x: int, target: float
+) -> None:
+    """The next update of V(x), into `learned`: V itself, or a copy while V stands still."""
+    N[x] += 1
+    learned[x] += step_size(rule, N[x]) * (target - V[x])

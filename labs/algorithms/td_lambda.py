@@ -44,7 +44,7 @@ def lambda_return(
     for t in range(T - 1, -1, -1):
         J = episode.costs[t] + gamma * ((1.0 - lam) * V[states[t + 1]] + lam * J)
         episode.returns[t] = J
-    move_to_returns(episode, 0, T, rule, V, N)
+    move_to_returns(episode, T, rule, V, N)
 
 
 @compiled

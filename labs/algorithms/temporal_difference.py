@@ -16,9 +16,9 @@ as in `monte_carlo`."""
 
 import numpy as np
 
-from labs.algorithms.monte_carlo import costs_to_go
+from labs.algorithms.monte_carlo import costs_to_go, move
 from labs.compiled import compiled, inlined
-from labs.problems.episodes import UpdateRule, step_size
+from labs.problems.episodes import UpdateRule
 from labs.problems.prediction import Episode
 
 
@@ -38,10 +38,8 @@ def td0(
     """TD(0)."""
     learned = V.copy() if rule.offline else V
     for t in range(T):
-        x = episode.states[t]
-        N[x] += 1
         target = episode.costs[t] + gamma * V[episode.states[t + 1]]
-        learned[x] += step_size(rule, N[x]) * (target - V[x])
+        move(rule, V, N, learned, episode.states[t], target)
     if rule.offline:
         V[:] = learned
 
@@ -58,9 +56,7 @@ def n_step(
         _learn_from_n_costs(gamma, episode, t, rule, V, N, learned)
     costs_to_go(gamma, episode, T, V[states[T]], first)
     for t in range(first, T):
-        x = states[t]
-        N[x] += 1
-        learned[x] += step_size(rule, N[x]) * (episode.returns[t] - V[x])
+        move(rule, V, N, learned, states[t], episode.returns[t])
     if rule.offline:
         V[:] = learned
 
@@ -84,7 +80,5 @@ def _learn_from_n_costs(
     N: np.ndarray,
     learned: np.ndarray,
 ) -> None:
-    x = episode.states[t]
-    N[x] += 1
     J = n_step_return(gamma, episode, t, rule.n, V[episode.states[t + rule.n]])
-    learned[x] += step_size(rule, N[x]) * (J - V[x])
+    move(rule, V, N, learned, episode.states[t], J)

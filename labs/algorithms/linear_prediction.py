@@ -33,11 +33,18 @@ from labs.problems.prediction import Episode, PredictionTask, importance
 
 @inlined
 def _move(
-    features: Features, rule: UpdateRule, w: np.ndarray, count: np.ndarray, x: int, target: float
+    features: Features,
+    rule: UpdateRule,
+    w: np.ndarray,
+    count: np.ndarray,
+    x: int,
+    target: float,
+    rho: float = 1.0,
 ) -> None:
     """v(x) towards a target."""
     count[0] += 1
-    add_features(features, w, x, step_size(rule, count[0]) * (target - evaluate(features, w, x)))
+    weight = step_size(rule, count[0]) * rho
+    add_features(features, w, x, weight * (target - evaluate(features, w, x)))
 
 
 @compiled
@@ -88,10 +95,8 @@ def semi_gradient_td(
     for t in range(T):
         x, y = episode.states[t], episode.states[t + 1]
         target = episode.costs[t] + task.task.gamma * evaluate(features, w, y)
-        count[0] += 1
-        delta = target - evaluate(features, w, x)
-        weight = step_size(rule, count[0]) * importance(task, x, episode.controls[t])
-        add_features(features, w, x, weight * delta)
+        rho = importance(task, x, episode.controls[t])
+        _move(features, rule, w, count, x, target, rho)
 
 
 @compiled

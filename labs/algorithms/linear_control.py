@@ -14,22 +14,25 @@ diverge (3.8.1).
 `init` knows nothing, `step` learns from some more episodes; both leave the old learners alone."""
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
 from labs.algorithms.exploration import FOLLOW, BehaviourPolicy, choose
 from labs.algorithms.features import Features, add_features, evaluate
+from labs.algorithms.monte_carlo import costs_to_go
 from labs.compiled import compiled
 from labs.errors import LabError
 from labs.problems.episodes import (
     EpisodicTask,
+    Learner,
     UpdateRule,
     initial_state,
     min_q,
+    record,
     step_size,
     transition,
 )
+from labs.problems.prediction import empty_episode
 from labs.random_numbers import seeded
 
 MC_CONTROL, SARSA, Q_LEARNING = range(3)
@@ -51,16 +54,6 @@ class LinearControllers:
     """(S, k) int64: its number of transitions."""
     sound: np.ndarray
     """(S,) bool: False once an update has left the rule's limit; the learner then stands still."""
-
-
-class _Learner(NamedTuple):
-    w: np.ndarray
-    visits: np.ndarray
-    random: np.ndarray
-    costs: np.ndarray
-    lengths: np.ndarray
-    q: np.ndarray
-    """(X, U) room for the values of the states at hand."""
 
 
 def init(
@@ -131,13 +124,13 @@ def _learn(
     q = np.zeros(task.cost.shape)
     for s in range(len(w)):
         if sound[s]:
-            learner = _Learner(w[s], visits[s], random[s], costs[s], lengths[s], q)
+            learner = Learner(q, visits[s], random[s], costs[s], lengths[s])
             if method == MC_CONTROL:
-                sound[s] = _monte_carlo(task, features, behaviour, rule, learner)
+                sound[s] = _monte_carlo(task, features, behaviour, rule, learner, w[s])
             elif method == SARSA:
-                sound[s] = _sarsa(task, features, behaviour, rule, learner)
+                sound[s] = _sarsa(task, features, behaviour, rule, learner, w[s])
             else:
-                sound[s] = _q_learning(task, features, behaviour, rule, learner)
+                sound[s] = _q_learning(task, features, behaviour, rule, learner, w[s])
 
 
 @compiled
@@ -146,21 +139,22 @@ def _q_learning(
     features: Features,
     behaviour: BehaviourPolicy,
     rule: UpdateRule,
-    learner: _Learner,
+    learner: Learner,
+    w: np.ndarray,
 ) -> bool:
     """False where it diverged."""
     for k in range(len(learner.costs)):
         x, discount = initial_state(task, learner.random), 1.0
         while learner.lengths[k] < task.horizon and not task.terminal[x]:
-            _look(features, learner, x)
+            _look(features, w, learner.q, x)
             u = choose(behaviour, x, learner.q, learner.visits, learner.random)
             y = transition(task, x, u, learner.random)
-            _look(features, learner, y)
+            _look(features, w, learner.q, y)
             target = task.cost[x, u]
             if not task.terminal[y]:
                 target += task.gamma * min_q(learner.q, y)
-            discount = _record(task, learner, k, x, u, discount)
-            if not _move(features, rule, learner, x, u, target):
+            discount = record(task, learner, k, x, u, discount)
+            if not _move(features, rule, learner, w, x, u, target):
                 return False
             x = y
     return True
@@ -172,22 +166,23 @@ def _sarsa(
     features: Features,
     behaviour: BehaviourPolicy,
     rule: UpdateRule,
-    learner: _Learner,
+    learner: Learner,
+    w: np.ndarray,
 ) -> bool:
     """False where it diverged."""
     for k in range(len(learner.costs)):
         x, discount = initial_state(task, learner.random), 1.0
-        _look(features, learner, x)
+        _look(features, w, learner.q, x)
         u = choose(behaviour, x, learner.q, learner.visits, learner.random)
         while learner.lengths[k] < task.horizon and not task.terminal[x]:
             y, next_u = transition(task, x, u, learner.random), 0
             target = task.cost[x, u]
             if not task.terminal[y]:
-                _look(features, learner, y)
+                _look(features, w, learner.q, y)
                 next_u = choose(behaviour, y, learner.q, learner.visits, learner.random)
                 target += task.gamma * learner.q[y, next_u]
-            discount = _record(task, learner, k, x, u, discount)
-            if not _move(features, rule, learner, x, u, target):
+            discount = record(task, learner, k, x, u, discount)
+            if not _move(features, rule, learner, w, x, u, target):
                 return False
             x, u = y, next_u
     return True
@@ -199,51 +194,46 @@ def _monte_carlo(
     features: Features,
     behaviour: BehaviourPolicy,
     rule: UpdateRule,
-    learner: _Learner,
+    learner: Learner,
+    w: np.ndarray,
 ) -> bool:
     """Every-visit Monte Carlo control. False where it diverged."""
-    xs, us = np.empty(task.horizon, np.int64), np.empty(task.horizon, np.int64)
-    returns = np.empty(task.horizon)
+    episode = empty_episode(task.horizon)
+    states, controls = episode.states, episode.controls
     for k in range(len(learner.costs)):
         x, discount, T = initial_state(task, learner.random), 1.0, 0
         while learner.lengths[k] < task.horizon and not task.terminal[x]:
-            _look(features, learner, x)
+            _look(features, w, learner.q, x)
             u = choose(behaviour, x, learner.q, learner.visits, learner.random)
-            xs[T], us[T], T = x, u, T + 1
-            discount = _record(task, learner, k, x, u, discount)
+            states[T], controls[T], episode.costs[T], T = x, u, task.cost[x, u], T + 1
+            discount = record(task, learner, k, x, u, discount)
             x = transition(task, x, u, learner.random)
         # What a cut episode would still have cost nobody knows: it counts as far as it went.
-        J = 0.0
-        for t in range(T - 1, -1, -1):
-            J = task.cost[xs[t], us[t]] + task.gamma * J
-            returns[t] = J
+        costs_to_go(task.gamma, episode, T, 0.0)
         for t in range(T):
-            if not _move(features, rule, learner, xs[t], us[t], returns[t]):
+            if not _move(features, rule, learner, w, states[t], controls[t], episode.returns[t]):
                 return False
     return True
 
 
 @compiled
-def _look(features: Features, learner: _Learner, x: int) -> None:
+def _look(features: Features, w: np.ndarray, q: np.ndarray, x: int) -> None:
     """Writes q(x, .) where behaviour policies look."""
-    for u in range(len(learner.w)):
-        learner.q[x, u] = evaluate(features, learner.w[u], x)
+    for u in range(len(w)):
+        q[x, u] = evaluate(features, w[u], x)
 
 
 @compiled
 def _move(
-    features: Features, rule: UpdateRule, learner: _Learner, x: int, u: int, target: float
+    features: Features,
+    rule: UpdateRule,
+    learner: Learner,
+    w: np.ndarray,
+    x: int,
+    u: int,
+    target: float,
 ) -> bool:
     learner.visits[x, u] += 1
-    delta = target - evaluate(features, learner.w[u], x)
-    add_features(features, learner.w[u], x, step_size(rule, learner.visits[x, u]) * delta)
+    delta = target - evaluate(features, w[u], x)
+    add_features(features, w[u], x, step_size(rule, learner.visits[x, u]) * delta)
     return bool(abs(delta) <= rule.limit)
-
-
-@compiled
-def _record(
-    task: EpisodicTask, learner: _Learner, k: int, x: int, u: int, discount: float
-) -> float:
-    learner.costs[k] += discount * task.cost[x, u]
-    learner.lengths[k] += 1
-    return discount * task.gamma

@@ -105,10 +105,10 @@ def replay(
 ) -> np.ndarray:
     """w (d,) after so many further updates of prediction, `drawn` of which were made before.
     `random` (4,) uint64 changes in place. Raises LabError for an empty batch."""
-    _check(batch)
-    learned = np.array(w, float)
-    _replay(features, batch, gamma, rule, method == REPLAY_TD, learned, random, draws, drawn)
-    return learned
+    # v is q of a single control.
+    alone, bootstrap = batch._replace(u=np.zeros_like(batch.u)), method == REPLAY_TD
+    after = _replayed(features, alone, gamma, rule, bootstrap, w[None], random, draws, drawn)
+    return np.asarray(after[0])
 
 
 def replay_q_learning(
@@ -123,15 +123,25 @@ def replay_q_learning(
 ) -> np.ndarray:
     """w (U, d) after so many further updates of Q-learning, as `replay`. It stops short of the
     update after the one whose error leaves the rule's limit."""
-    _check(batch)
-    learned = np.array(w, float)
-    _replay_q(features, batch, gamma, rule, learned, random, draws, drawn)
-    return learned
+    return _replayed(features, batch, gamma, rule, True, w, random, draws, drawn)
 
 
-def _check(batch: Transitions) -> None:
+def _replayed(
+    features: Features,
+    batch: Transitions,
+    gamma: float,
+    rule: UpdateRule,
+    bootstrap: bool,
+    w: np.ndarray,
+    random: np.ndarray,
+    draws: int,
+    drawn: int,
+) -> np.ndarray:
     if not len(batch.x):
         raise LabError("an empty batch teaches nothing: collect some episodes first")
+    learned = np.array(w, float)
+    _replay(features, batch, gamma, rule, bootstrap, learned, random, draws, drawn)
+    return learned
 
 
 @compiled
@@ -150,31 +160,12 @@ def _replay(
         i = below(random, len(batch.x))
         target = batch.returns[i]
         if bootstrap:
-            target = batch.cost[i] + gamma * evaluate(features, w, batch.y[i])
-        delta = target - evaluate(features, w, batch.x[i])
-        add_features(features, w, batch.x[i], step_size(rule, n) * delta)
-        if not abs(delta) <= rule.limit:
-            return
-
-
-@compiled
-def _replay_q(
-    features: Features,
-    batch: Transitions,
-    gamma: float,
-    rule: UpdateRule,
-    w: np.ndarray,
-    random: np.ndarray,
-    draws: int,
-    drawn: int,
-) -> None:
-    for n in range(drawn + 1, drawn + draws + 1):
-        i = below(random, len(batch.x))
-        least = np.inf
-        for u in range(len(w)):
-            least = min(least, evaluate(features, w[u], batch.y[i]))
+            least = np.inf
+            for u in range(len(w)):
+                least = min(least, evaluate(features, w[u], batch.y[i]))
+            target = batch.cost[i] + gamma * least
         mine = w[batch.u[i]]
-        delta = batch.cost[i] + gamma * least - evaluate(features, mine, batch.x[i])
+        delta = target - evaluate(features, mine, batch.x[i])
         add_features(features, mine, batch.x[i], step_size(rule, n) * delta)
         if not abs(delta) <= rule.limit:
             return

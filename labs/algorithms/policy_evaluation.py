@@ -60,6 +60,17 @@ def exact(mdp: FiniteMDP, policy: np.ndarray) -> np.ndarray:
     return np.where(found.finite, found.V, np.inf)
 
 
+def expected_visits(mdp: FiniteMDP, policy: np.ndarray, start: int) -> np.ndarray:
+    """(X,) eta: the steps that an episode from `start` begins in each state, on average, with a
+    policy that is sure to end it: eta = h + P'eta, h the start; 0 in terminal states."""
+    inside = ~mdp.terminal
+    P = mdp.transition_matrix(policy)[np.ix_(inside, inside)]
+    begun = (np.arange(mdp.X) == start)[inside].astype(float)
+    visits = np.zeros(mdp.X)
+    visits[inside] = np.linalg.solve(np.eye(len(P)) - P.T, begun)
+    return np.maximum(visits, 0.0)
+
+
 def _sparse_value(P: csr_array, cost: np.ndarray, gamma: float) -> np.ndarray:
     """V (X,) of a chain with the transition matrix P (X, X) and costs (X,)."""
     endless, rest = np.zeros(len(cost), bool), np.zeros(len(cost), bool)

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from labs.algorithms import policy_iteration
-from labs.algorithms.policy_evaluation import exact
+from labs.algorithms.policy_evaluation import exact, expected_visits
 from labs.problems.finite_mdp import FiniteMDP, random_policy
 from labs.problems.prediction import PredictionTask, prediction_task, weighted_error
 from labs.tasks.grid_world.map import GridWorld, grid_world
@@ -55,7 +55,7 @@ def walk_place(gamma: float) -> Place:
     mdp = FiniteMDP(free.C, gamma, free.terminal, successor=free.successor)
     policy, start = random_policy(mdp), NINETEEN.start
     task = prediction_task(mdp, policy, exact(mdp, policy), [start], HORIZON)
-    return Place(task, None, float(_visits(mdp, policy, start).sum()))
+    return Place(task, None, float(expected_visits(mdp, policy, start).sum()))
 
 
 @lru_cache(maxsize=16)
@@ -66,18 +66,8 @@ def grid_place(text: str, wander: float, gamma: float) -> Place:
     mdp = world.mdp(gamma)
     _, best, _ = policy_iteration.optimum(world.mdp(1.0), np.zeros(mdp.X, np.int64))
     policy = (1.0 - wander) * np.eye(mdp.U)[best] + wander / mdp.U
-    visits = _visits(mdp, policy, world.start)
+    visits = expected_visits(mdp, policy, world.start)
     task = prediction_task(
         mdp, policy, exact(mdp, policy), [world.start], GRID_HORIZON, weight=visits
     )
     return Place(task, world, float(visits.sum()))
-
-
-def _visits(mdp: FiniteMDP, policy: np.ndarray, start: int) -> np.ndarray:
-    """(X,) eta: steps an episode begins in each state, on average: eta = h + P'eta, h the start."""
-    inside = ~mdp.terminal
-    P = mdp.transition_matrix(policy)[np.ix_(inside, inside)]
-    begun = (np.arange(mdp.X) == start)[inside].astype(float)
-    visits = np.zeros(mdp.X)
-    visits[inside] = np.linalg.solve(np.eye(len(P)) - P.T, begun)
-    return np.maximum(visits, 0.0)

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from labs.algorithms.policy_evaluation import expected_visits
 from labs.algorithms.prediction import on_policy
 from labs.problems.finite_mdp import FiniteMDP, random_policy
 from labs.problems.prediction import PredictionTask
@@ -71,14 +72,7 @@ def walk_task(walk: WalkShape) -> PredictionTask:
 
 
 def visit_share(walk: WalkShape) -> np.ndarray:
-    """(n + 2,) mu: the share of all steps that begin in each state, 0 at the ends. Episodes spend
-    eta = h + P'eta steps there, with h the start; mu = eta / sum of eta."""
+    """(n + 2,) mu: the share of all steps that begin in each state, 0 at the ends."""
     mdp = walk_mdp(walk)
-    inside = ~mdp.terminal
-    P = mdp.transition_matrix(random_policy(mdp))[np.ix_(inside, inside)]
-    begun = np.zeros(walk.states)
-    begun[walk.start - 1] = 1.0
-    share: np.ndarray = np.zeros(mdp.X)
-    share[inside] = np.linalg.solve(np.eye(walk.states) - P.T, begun)
-    share /= share.sum()
-    return share
+    visits = expected_visits(mdp, random_policy(mdp), walk.start)
+    return np.asarray(visits / visits.sum())

@@ -13,6 +13,7 @@ then the estimates diverge. Replacing traces never exceed 1."""
 import numpy as np
 
 from labs.algorithms.exploration import BehaviourPolicy, choose
+from labs.algorithms.td_lambda import NEGLIGIBLE_TRACE
 from labs.compiled import compiled
 from labs.problems.episodes import (
     EpisodicTask,
@@ -23,9 +24,6 @@ from labs.problems.episodes import (
     step_size,
     transition,
 )
-
-NEGLIGIBLE_TRACE = 1e-12
-"""A trace below this is over: it is beyond the digits of a float."""
 
 
 @compiled

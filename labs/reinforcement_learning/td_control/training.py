@@ -20,8 +20,8 @@ import numpy as np
 
 from labs.algorithms.exploration import BehaviourPolicy
 from labs.algorithms.policy_evaluation import exact
-from labs.algorithms.sarsa_lambda import NEGLIGIBLE_TRACE
 from labs.algorithms.td_control import SARSA_LAMBDA, Learners, greedy_costs, init, step
+from labs.algorithms.td_lambda import NEGLIGIBLE_TRACE
 from labs.problems.episodes import UpdateRule
 from labs.reinforcement_learning.td_control.tasks import LearningTask
 

@@ -109,6 +109,13 @@ def sample_episode(task: PredictionTask, random: np.ndarray, episode: Episode) -
     return t
 
 
+@compiled
+def sample_step(task: PredictionTask, x: int, random: np.ndarray) -> tuple[int, int]:
+    """A control of the policy in state x, and the next state, as in an episode."""
+    u = _choose(task.choices, x, random)
+    return u, transition(task.task, x, u, random)
+
+
 @inlined
 def _choose(choices: np.ndarray, x: int, random: np.ndarray) -> int:
     controls = choices.shape[1]

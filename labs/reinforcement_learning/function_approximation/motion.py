@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labs.problems.finite_mdp import FiniteMDP
-from labs.problems.prediction import PredictionTask, empty_episode, sample_episode
+from labs.problems.prediction import PredictionTask, sample_step
 from labs.random_numbers import below
 from labs.tasks.pendulum_table.swing import Swing, advance_swing, look_up_torques, start_swing
 from labs.tasks.pendulum_table.table import PendulumGrid
@@ -42,16 +42,13 @@ def hop(task: PredictionTask, motion: Motion) -> Motion:
     """A period later: a step of the policy that is followed, every now and then."""
     if motion.place >= 0 and motion.clock + 1 < HOP:
         return replace(motion, clock=motion.clock + 1)
-    random, inner = motion.random.copy(), task.task
-    here, episode = motion.place, empty_episode(1)
-    if here < 0 or inner.terminal[here]:
-        starts = inner.starts
-        return replace(
-            motion, place=int(starts[below(random, len(starts))]), random=random, clock=0
-        )
-    from_here = task._replace(task=inner._replace(starts=np.array([here]), horizon=1))
-    sample_episode(from_here, random, episode)
-    return replace(motion, place=int(episode.states[1]), random=random, clock=0)
+    random, here = motion.random.copy(), motion.place
+    if here < 0 or task.task.terminal[here]:
+        starts = task.task.starts
+        place = int(starts[below(random, len(starts))])
+    else:
+        _, place = sample_step(task, here, random)
+    return replace(motion, place=place, random=random, clock=0)
 
 
 def swing_by(

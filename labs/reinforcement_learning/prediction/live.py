@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labs.algorithms.monte_carlo import every_visit, first_visit
-from labs.problems.episodes import UpdateRule, initial_state, step_size, transition
-from labs.problems.prediction import Episode
-from labs.random_numbers import uniform
+from labs.algorithms.temporal_difference import td0
+from labs.problems.episodes import UpdateRule, initial_state
+from labs.problems.prediction import Episode, sample_step
 from labs.reinforcement_learning.prediction.worlds import PredictionWorld
 
 REST = 1.0
@@ -68,7 +68,7 @@ def advance(
     if world.mdp.terminal[y] or len(live.controls) >= world.task.task.horizon:
         return replace(live, phase=1.0, episodes=live.episodes + 1)
     random = live.random.copy()
-    u, ahead = _drawn(world, y, random)
+    u, ahead = sample_step(world.task, y, random)
     return replace(
         live,
         states=np.append(live.states, ahead),
@@ -83,30 +83,24 @@ def _new_episode(
 ) -> Live:
     """`random` changes in place."""
     x = initial_state(world.task.task, random)
-    u, y = _drawn(world, x, random)
+    u, y = sample_step(world.task, x, random)
     return Live(np.array([x, y]), np.array([u]), V, visits, random, 0.0, episodes)
-
-
-def _drawn(world: PredictionWorld, x: int, random: np.ndarray) -> tuple[int, int]:
-    """A control and where it leads."""
-    chances = np.cumsum(world.policy[x])
-    u = min(int(np.searchsorted(chances, uniform(random), "right")), world.mdp.U - 1)
-    return u, int(transition(world.task.task, x, u, random))
 
 
 def _learned(
     world: PredictionWorld, rules: tuple[UpdateRule, UpdateRule], first: bool, live: Live
 ) -> Live:
     """What the step that was just done teaches."""
-    V, visits, mdp = live.V.copy(), live.visits.copy(), world.mdp
-    x, u, y, gamma = live.states[-2], live.controls[-1], live.states[-1], mdp.gamma
-    visits[1, x] += 1
-    step = step_size(rules[1], int(visits[1, x]))
-    V[1, x] += step * (mdp.C[x, u] + gamma * V[1, y] - V[1, x])
-    if mdp.terminal[y]:
-        T = len(live.controls)
-        costs = np.ascontiguousarray(mdp.C[live.states[:-1], live.controls])
-        episode = Episode(live.states, live.controls, costs, np.empty(T))
+    V, visits, gamma, T = live.V.copy(), live.visits.copy(), world.mdp.gamma, len(live.controls)
+    td0(gamma, _last_steps(world, live, 1), 1, rules[1], V[1], visits[1])
+    if world.mdp.terminal[live.states[-1]]:
         update = first_visit if first else every_visit
-        update(gamma, episode, T, True, rules[0], V[0], visits[0])
+        update(gamma, _last_steps(world, live, T), T, True, rules[0], V[0], visits[0])
     return replace(live, V=V, visits=visits)
+
+
+def _last_steps(world: PredictionWorld, live: Live, many: int) -> Episode:
+    """As an episode."""
+    states, controls = live.states[-many - 1 :], live.controls[-many:]
+    costs = np.ascontiguousarray(world.mdp.C[states[:-1], controls])
+    return Episode(states, controls, costs, np.empty(many))

@@ -41,12 +41,12 @@ class Triad:
     def measure(self, params: ApproximationParams, training: Training) -> dict[str, float]:
         return {
             "error_now": float(training["errors"].mean()),
-            "growth": float(np.linalg.eigvals(-triad.mean_matrix(params)).real.max()),
+            "growth": float(triad.eigenvalues(params).real.max()),
             "largest": float(np.abs(training["w"]).max()),
         }
 
     def fields(self, params: ApproximationParams, training: Training) -> Fields:
-        values = np.linalg.eigvals(-triad.mean_matrix(params))
+        values = triad.eigenvalues(params)
         found = {"steps": training["steps"], "weights": training["path"]}
         found |= {"real": values.real, "imaginary": values.imag}
         return found | spread("error", training["error"])

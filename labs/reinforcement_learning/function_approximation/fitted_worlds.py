@@ -49,11 +49,11 @@ class Predicted:
         measured = {
             "size": float(given.features.size),
             "error_now": float(training["errors"].mean()),
-            "error_best": given.error(given.best),
-            "error_fixed": given.error(given.fixed),
+            "error_best": given.best_error,
+            "error_fixed": given.fixed_error,
         }
         if params.world == "surface":
-            measured["bound"] = given.error(given.best) / (1.0 - GAMMA)
+            measured["bound"] = given.best_error / (1.0 - GAMMA)
         if training["squares"].size:
             measured["error_squares"] = float(training["squares"].mean())
         return measured
@@ -61,7 +61,7 @@ class Predicted:
     def fields(self, params: ApproximationParams, training: Training) -> Fields:
         given = given_policy(params)
         found = {"steps": training["steps"]} | spread("error", training["error"])
-        best, fixed = given.error(given.best), given.error(given.fixed)
+        best, fixed = given.best_error, given.fixed_error
         found |= over_all(training, reference_best=best, reference_fixed=fixed)
         if training["squares"].size and len(training["steps"]) > 1:
             found["squares_x"] = training["steps"][[0, -1]]

@@ -5,7 +5,7 @@ The pendulum's episodes begin anywhere and end once it is caught, upright and sl
 nothing is paid. All of it is deterministic but the start."""
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -46,8 +46,17 @@ class GivenPolicy:
 
     def error(self, w: np.ndarray) -> float:
         """sqrt of the value error of w (d,)."""
-        v = (self.features.value * w[self.features.active]).sum(axis=1)
-        return float(np.sqrt(self.task.weight @ (v - self.task.truth) ** 2))
+        return float(np.sqrt(self.task.weight @ (self.values(w) - self.task.truth) ** 2))
+
+    @cached_property
+    def best_error(self) -> float:
+        """The least there is."""
+        return self.error(self.best)
+
+    @cached_property
+    def fixed_error(self) -> float:
+        """Of the TD fixed point."""
+        return self.error(self.fixed)
 
     def values(self, w: np.ndarray) -> np.ndarray:
         """v (X,)."""

@@ -78,6 +78,12 @@ def mean_matrix(params: ApproximationParams) -> np.ndarray:
     return A
 
 
+@lru_cache(maxsize=4)
+def eigenvalues(params: ApproximationParams) -> np.ndarray:
+    """(d,) of -A."""
+    return np.linalg.eigvals(-mean_matrix(params))
+
+
 def task_frequencies(params: ApproximationParams) -> tuple[np.ndarray, np.ndarray]:
     """mu (X,), how often each state is learned from, and P (X, X) of the policy judged."""
     P = example(params).mdp.probabilities

@@ -113,6 +113,11 @@ def tiles(points: np.ndarray, tilings: int, cells: np.ndarray) -> Features:
     return Features(index, np.ones(index.shape), each * tilings)
 
 
+def values(features: Features, w: np.ndarray) -> np.ndarray:
+    """(..., X) phi(x)' w of all states, of w (..., d)."""
+    return np.asarray((features.value * w[..., features.active]).sum(axis=-1))
+
+
 @inlined
 def evaluate(features: Features, w: np.ndarray, x: int) -> float:
     """phi(x)' w of w (d,)."""

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labs.algorithms.exploration import FOLLOW, BehaviourPolicy, choose
-from labs.algorithms.features import Features, add_features, evaluate
+from labs.algorithms.features import Features, add_features, evaluate, values
 from labs.algorithms.monte_carlo import costs_to_go
 from labs.compiled import compiled
 from labs.errors import LabError
@@ -104,7 +104,7 @@ def step(
 
 def q_table(features: Features, w: np.ndarray) -> np.ndarray:
     """(X, U) q of weights (U, d)."""
-    return np.asarray(features.dense @ w.T)
+    return values(features, w).T
 
 
 @compiled

@@ -3,6 +3,7 @@
 import numpy as np
 
 from labs.algorithms.features import Features
+from labs.algorithms.linear_control import q_table
 from labs.reinforcement_learning.function_approximation import prediction, swing_up
 from labs.reinforcement_learning.function_approximation.given_policy import (
     GAMMA,
@@ -26,7 +27,6 @@ from labs.reinforcement_learning.function_approximation.subject import Fields, T
 from labs.reinforcement_learning.function_approximation.swing_up import (
     HANGING,
     features_of,
-    q_of,
     swing_task,
 )
 from labs.resumable import Resumable
@@ -120,7 +120,7 @@ class SwingUp:
 
     def fields(self, params: ApproximationParams, training: Training) -> Fields:
         _, _, q_star = swing_task()
-        q = q_of(features_of(params), training["w"][params.shown])
+        q = q_table(features_of(params), training["w"][params.shown])
         found = {"steps": training["steps"]} | spread("greedy", training["greedy"], "median")
         found |= over_all(training, optimum=float(q_star[HANGING].min()))
         found |= _maps(params, features_of(params), q.min(axis=1), q_star.min(axis=1))
@@ -129,7 +129,7 @@ class SwingUp:
 
     def move(self, params: ApproximationParams, training: Training, motion: Motion) -> Motion:
         def greedy() -> np.ndarray:
-            q = q_of(features_of(params), training["w"][params.shown])
+            q = q_table(features_of(params), training["w"][params.shown])
             return np.asarray(q.argmin(axis=1))
 
         return swing_by(PENDULUM, swing_task()[0], greedy, motion)
@@ -137,7 +137,7 @@ class SwingUp:
     def draw(
         self, scene: Scene, params: ApproximationParams, training: Training, motion: Motion
     ) -> None:
-        q = q_of(features_of(params), training["w"][params.shown])
+        q = q_table(features_of(params), training["w"][params.shown])
         truth, v = swing_task()[2].min(axis=1), q.min(axis=1)
         policy = q.argmin(axis=1)
         _draw_relief(scene, params, features_of(params), v, truth, policy, motion)

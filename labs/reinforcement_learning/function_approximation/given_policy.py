@@ -11,7 +11,7 @@ import numpy as np
 
 from labs.algorithms import policy_iteration
 from labs.algorithms.approximation import best_fit, mean_update, td_fixed_point
-from labs.algorithms.features import Features, vanishing
+from labs.algorithms.features import Features, values, vanishing
 from labs.problems.finite_mdp import FiniteMDP, random_policy
 from labs.problems.prediction import PredictionTask, prediction_task
 from labs.reinforcement_learning.function_approximation.feature_sets import (
@@ -60,7 +60,7 @@ class GivenPolicy:
 
     def values(self, w: np.ndarray) -> np.ndarray:
         """v (X,)."""
-        return np.asarray((self.features.value * w[self.features.active]).sum(axis=1))
+        return values(self.features, w)
 
 
 @lru_cache(maxsize=8)

@@ -23,7 +23,7 @@ from labs.algorithms.batch_approximation import (
 from labs.algorithms.bellman import q_values
 from labs.algorithms.exploration import BehaviourPolicy
 from labs.algorithms.features import Features
-from labs.algorithms.linear_control import LinearControllers
+from labs.algorithms.linear_control import LinearControllers, q_table
 from labs.algorithms.policy_evaluation import exact
 from labs.problems.episodes import EpisodicTask, UpdateRule, episodic_task
 from labs.problems.finite_mdp import FiniteMDP, random_policy
@@ -57,11 +57,6 @@ def swing_task() -> tuple[FiniteMDP, EpisodicTask, np.ndarray]:
 def features_of(params: ApproximationParams) -> Features:
     """Of the plane's nodes."""
     return plane_features(params.features, round(params.m), PENDULUM)
-
-
-def q_of(features: Features, w: np.ndarray) -> np.ndarray:
-    """(X, U) of weights (U, d)."""
-    return np.asarray((features.value[:, None] * w.T[features.active].transpose(0, 2, 1)).sum(2))
 
 
 def begin(params: ApproximationParams, rng: np.random.Generator) -> Training:
@@ -147,7 +142,7 @@ def _recorded(features: Features, training: Training, part: int) -> Training:
     mdp, _, q_star = swing_task()
     greedy, error = [], []
     for w in training["w"]:
-        q = q_of(features, w)
+        q = q_table(features, w)
         greedy.append(float(exact(mdp, q.argmin(axis=1))[HANGING]))
         error.append(float(np.sqrt(np.mean((q.min(axis=1) - q_star.min(axis=1)) ** 2))))
     done = float(training["steps"][-1]) if training["steps"].size else 0.0

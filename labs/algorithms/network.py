@@ -19,15 +19,10 @@ import numpy as np
 from labs.compiled import compiled
 
 
-def weight_count(sizes: np.ndarray) -> int:
-    """How many weights there are, of layers of `sizes` (L + 1,)."""
-    return int((sizes[:-1] * sizes[1:] + sizes[1:]).sum())
-
-
 def random_weights(sizes: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """w, float32: W_k uniform with variance 2 / (its number of rows), which keeps the size of what
-    goes through (He et al., 2015); b = 0; the last layer a tenth of that, so that nothing is
-    believed before something was learned."""
+    """w, float32, of layers of `sizes` (L + 1,): W_k uniform with variance 2 / (its number of
+    rows), which keeps the size of what goes through (He et al., 2015); b = 0; the last layer a
+    tenth of that, so that nothing is believed before something was learned."""
     parts = []
     for k, (rows, columns) in enumerate(pairwise(sizes)):
         largest = np.sqrt(6.0 / rows) * (0.1 if k == len(sizes) - 2 else 1.0)

@@ -12,8 +12,6 @@ from labs.tasks.grid_world.picture import board, draw_board, draw_way
 from labs.tasks.random_walk.picture import draw_values, draw_walk
 from labs.tasks.random_walk.walks import NINETEEN
 
-DIMMEST = 0.02
-"""Traces below this do not glow."""
 WAY = 150
 """Steps of the way that are drawn."""
 

@@ -11,7 +11,6 @@ from labs.algorithms.network import (
     forward,
     no_moments,
     random_weights,
-    weight_count,
 )
 
 
@@ -30,7 +29,8 @@ def plain_forward(sizes: np.ndarray, w: np.ndarray, x: np.ndarray) -> np.ndarray
 @pytest.mark.parametrize("sizes", [(3, 2), (3, 7, 2), (4, 8, 6, 5), (2, 5, 5, 5, 1)])
 def test_gradients_are_those_of_finite_differences(sizes: tuple[int, ...]) -> None:
     rng, widths, n, eps = np.random.default_rng(1), np.array(sizes), 6, 1e-6
-    w = random_weights(widths, rng).astype(float) + 0.1 * rng.normal(size=weight_count(widths))
+    w = random_weights(widths, rng).astype(float)
+    w += 0.1 * rng.normal(size=len(w))
     x, c = rng.normal(size=(n, sizes[0])), rng.normal(size=(n, sizes[-1]))
     memory, gradient = np.empty(n * widths.sum()), np.empty_like(w)
     y = forward(widths, w, x, memory)

@@ -12,12 +12,12 @@ to, for a weight mu(x) > 0 of the states, D = diag(mu), Phi (X, d) and the chain
 The mean step of TD is alpha (b - A w): it converges where all eigenvalues of A have positive real
 parts, which is sure where mu is the policy's own share of visits, and of no other."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
 
-from labs.algorithms.features import Features, evaluate
+from labs.algorithms.features import Features, evaluate, values
 from labs.algorithms.linear_prediction import (
     gradient_monte_carlo,
     gradient_oracle,
@@ -32,6 +32,7 @@ from labs.problems.episodes import UpdateRule
 from labs.problems.prediction import (
     PredictionTask,
     empty_episode,
+    root_mean_square_error,
     sample_episode,
     weighted_error,
 )
@@ -71,16 +72,15 @@ def init(
         )
     if features.value[task.task.terminal].any():
         raise LabError("in terminal states all features are 0, as is the value")
-    learners = LinearPredictors(
+    first = root_mean_square_error(task, values(features, w))
+    return LinearPredictors(
         w=np.tile(np.asarray(w, float), (seeds, 1)),
         h=np.zeros((seeds, features.size)),
         count=np.zeros((seeds, 1), np.int64),
         random=seeded(rng, seeds),
-        errors=np.zeros(seeds),
+        errors=np.full(seeds, first),
         sound=np.ones(seeds, bool),
     )
-    first = features.dense @ w - task.truth
-    return replace(learners, errors=np.full(seeds, np.sqrt(task.weight @ first**2)))
 
 
 def step(

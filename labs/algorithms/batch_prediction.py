@@ -106,11 +106,6 @@ def certainty_equivalence(batch: Batch, V: np.ndarray, gamma: float) -> np.ndarr
     return np.asarray(np.linalg.solve(A, b[..., None])[..., 0])
 
 
-def root_mean_square_error(task: PredictionTask, V: np.ndarray) -> np.ndarray:
-    """(S,) the weighted error of V (S, X)."""
-    return np.asarray(np.sqrt((V - task.truth) ** 2 @ task.weight))
-
-
 @compiled
 def _collect(
     task: PredictionTask,

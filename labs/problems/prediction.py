@@ -145,6 +145,11 @@ def weighted_error(task: PredictionTask, V: np.ndarray) -> float:
     return float(np.sqrt(total))
 
 
+def root_mean_square_error(task: PredictionTask, V: np.ndarray) -> np.ndarray:
+    """(...) the same of V (..., X), not compiled."""
+    return np.asarray(np.sqrt((V - task.truth) ** 2 @ task.weight))
+
+
 def _probabilities(mdp: FiniteMDP, policy: np.ndarray) -> np.ndarray:
     if policy.ndim == 1:
         return np.asarray(np.eye(mdp.U)[policy])

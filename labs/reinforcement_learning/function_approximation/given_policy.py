@@ -13,7 +13,7 @@ from labs.algorithms import policy_iteration
 from labs.algorithms.approximation import best_fit, mean_update, td_fixed_point
 from labs.algorithms.features import Features, values, vanishing
 from labs.problems.finite_mdp import FiniteMDP, random_policy
-from labs.problems.prediction import PredictionTask, prediction_task
+from labs.problems.prediction import PredictionTask, prediction_task, root_mean_square_error
 from labs.reinforcement_learning.function_approximation.feature_sets import (
     line_features,
     plane_features,
@@ -46,7 +46,7 @@ class GivenPolicy:
 
     def error(self, w: np.ndarray) -> float:
         """sqrt of the value error of w (d,)."""
-        return float(np.sqrt(self.task.weight @ (self.values(w) - self.task.truth) ** 2))
+        return float(root_mean_square_error(self.task, self.values(w)))
 
     @cached_property
     def best_error(self) -> float:

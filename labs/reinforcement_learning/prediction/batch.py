@@ -26,10 +26,10 @@ from labs.algorithms.batch_prediction import (
     empty_batch,
     least_squares,
     monte_carlo_sweep,
-    root_mean_square_error,
     td_sweep,
 )
 from labs.lab import Snapshot
+from labs.problems.prediction import root_mean_square_error
 from labs.reinforcement_learning.prediction.params import PredictionParams
 from labs.reinforcement_learning.prediction.worlds import LEARNERS
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
+from labs.problems.prediction import root_mean_square_error
 from labs.random_numbers import seeded
 from labs.reinforcement_learning.td_lambda.live import (
     Steps,
@@ -132,9 +133,8 @@ class TdLambda(Lab[TdLambdaParams, TdLambdaState]):
         return edit_map(grid_world(params.map, False), params.brush, handle, point)
 
     def measure(self, params: TdLambdaParams, state: TdLambdaState) -> Measurement:
-        task = params.place.task
         numbers: dict[str, float | np.ndarray] = {
-            "error": np.sqrt((state.values - task.truth) ** 2 @ task.weight),
+            "error": root_mean_square_error(params.place.task, state.values),
             "episodes": float(state.episodes),
         }
         for name, count in zip(ORDER, state.changed, strict=False):

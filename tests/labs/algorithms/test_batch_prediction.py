@@ -11,12 +11,12 @@ from labs.algorithms.batch_prediction import (
     empty_batch,
     least_squares,
     monte_carlo_sweep,
-    root_mean_square_error,
     td_sweep,
 )
 from labs.algorithms.prediction import EVERY_VISIT, init, step
 from labs.errors import LabError
 from labs.problems.episodes import UpdateRule
+from labs.problems.prediction import root_mean_square_error
 from labs.tasks.random_walk.walks import FIVE, walk_task
 
 FIVE_TASK = walk_task(FIVE)

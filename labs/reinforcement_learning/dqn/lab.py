@@ -30,7 +30,7 @@ from labs.reinforcement_learning.dqn.training import (
 )
 from labs.scene import Scene
 from labs.tasks.environments.reach import reach
-from labs.tasks.environments.torque_task import PERIOD
+from labs.tasks.environments.torque_task import PERIOD, SUBSTEPS
 
 PUSH = 3.0
 """[rad/s]"""
@@ -54,7 +54,7 @@ class Dqn(Lab[DqnParams, DqnState]):
         "the robot tries its present policy. Take its replay or its fixed targets away and see."
     )
     Params = DqnParams
-    period = PERIOD / 4
+    period = PERIOD / SUBSTEPS
     plots = PLOTS
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Pendulum": {},

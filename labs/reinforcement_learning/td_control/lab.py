@@ -8,7 +8,7 @@ import numpy as np
 
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
-from labs.random_numbers import seeded
+from labs.random_numbers import seeded, uniform
 from labs.reinforcement_learning.td_control.greedy_walk import (
     PERIOD,
     follow_greedy_policies,
@@ -225,8 +225,10 @@ class TdControl(Lab[TdParams, TdState]):
 
     @classmethod
     def prepare(cls) -> None:
-        """Compiles the loops of all methods; the worlds share them."""
+        """Compiles the loops of all methods, which the worlds share, and the draws of the walkers
+        where moves are random."""
         lab = cls()
+        uniform(seeded(np.random.default_rng(0), 1)[0])
         for method in LEARNING_METHODS:
             params = TdParams(method=method, second="none")
             state = lab.init(params, np.random.default_rng(0))

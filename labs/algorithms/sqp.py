@@ -6,7 +6,8 @@ One iteration expands f, c and g about y and solves the quadratic programme
 
     minimise  f_y' p + p' P p / 2   subject to   c + c_y p = 0,   g + g_y p <= 0,   y + p in bounds
 
-whose multipliers lam, mu, nu are those of the next iterate, and searches along p (`sqp_step`). P
+whose multipliers lam, mu, nu are those of the next iterate, and searches along p (`sqp_step`). What
+is active settles after some iterations: from there on linear systems solve it (`sqp_active_set`). P
 is the Hessian of the Lagrangian L = f + lam' c + mu' g + nu' y, made convex (`sqp_convexity`);
 Gauss-Newton's, which knows f alone; or learnt (`sqp_bfgs`). It has converged where
 
@@ -20,7 +21,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from labs.algorithms import sqp_bfgs
+from labs.algorithms import sqp_active_set, sqp_bfgs
 from labs.algorithms.sqp_filter import LARGEST_GROWTH, Filter, violation
 from labs.algorithms.sqp_iterate import Iterate as Iterate
 from labs.algorithms.sqp_iterate import Options as Options
@@ -98,6 +99,11 @@ def restart(program: NonlinearProgram, last: Variables | Iterate, options: Optio
     if len(new.lam) != len(last.lam) or len(new.mu) != len(last.mu):
         return new
     return replace(new, lam=last.lam, mu=last.mu, nu=last.nu)
+
+
+def prepare() -> None:
+    """Compiles what is asked for."""
+    sqp_active_set.prepare()
 
 
 def _expanded(program: NonlinearProgram, options: Options, at: Iterate) -> Resumable[Iterate]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from labs.algorithms.sqp_active_set import ActiveSet
 from labs.algorithms.sqp_bfgs import Learnt
 from labs.algorithms.sqp_filter import Filter
 from labs.algorithms.sqp_optimality import Optimality
@@ -94,6 +95,10 @@ class Iterate:
     """At y."""
     learnt: Learnt | None = None
     """BFGS's Hessian."""
+    active: ActiveSet | None = None
+    """What the last QP's solution pushed against."""
+    settled: bool = False
+    """Whether that was nearly so in the one before, too."""
     loose: bool = False
     """Whether the last QP was not solved wholly: then it takes another one to converge."""
     solver: QpSolver = field(default_factory=QpSolver)

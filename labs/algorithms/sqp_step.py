@@ -42,6 +42,8 @@ PENALTY_FACTOR, PENALTY_LIMIT, RAISES = 10.0, 1e9, 3
 """By what gamma grows; the most it may be in parts of the size of f_y; how often in a step."""
 LARGEST_MULTIPLIER = 1e7
 """In parts of the size of f_y; where larger ones are needed, constraints may not be met at all."""
+FEW = 5
+"""Changes of the active set from one QP to the next, after which that of the third is guessed."""
 LOOSEST = 1e-2
 """Tolerance of a QP."""
 SHORT = 0.02
@@ -83,15 +85,17 @@ def moved(
             return replace(at, alpha=0.0, stopped=NOT_CONVEX)
         convex = found
         qp = _subproblem(program, at, convex.P, unit)
-        answer = None if at.penalty else solve_subproblem(qp, at.solver, tolerance)
+        guess = at.active if at.settled else None
+        answer = None if at.penalty else solve_subproblem(qp, at.solver, tolerance, guess)
         seconds["QP"] += perf_counter() - begun
         yield
         if not isinstance(answer, Unsolved) or answer.infeasible:
             break
-    loose = not at.penalty and tolerance > TOLERANCE
-    at = replace(at, delta=convex.delta, theta=convex.theta, loose=loose)
+    at = replace(at, delta=convex.delta, theta=convex.theta, loose=False, settled=False)
     most = LARGEST_MULTIPLIER * qp.unit
     if isinstance(answer, Answer) and _largest(answer) <= most:
+        settled = bool(at.active and answer.active.changes(at.active) <= FEW)
+        at = replace(at, loose=answer.loose, active=answer.active, settled=settled)
         again, slope = _corrections(options, at, qp, None), float(qp.q @ answer.p)
         looking = search(program, at.y, at.values, answer.p, slope, at.filter, again)
         end = yield from timed(looking, seconds, "line search")

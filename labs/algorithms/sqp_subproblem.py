@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import csc_array, diags_array, eye_array, hstack
 
+from labs.algorithms.sqp_active_set import ActiveSet, active_set, solve_active
 from labs.algorithms.sqp_qp_solver import QpSolver, QuadraticProgram
 
 TOLERANCE = 1e-11
@@ -54,15 +55,19 @@ class Answer(NamedTuple):
     lam: np.ndarray
     mu: np.ndarray
     nu: np.ndarray
+    active: ActiveSet
+    loose: bool = False
+    """Whether it is not as good as it could be."""
     excess: float = 0.0
     """Sum of the slacks: by how much p misses the constraints."""
 
 
 def solve_subproblem(
-    qp: Subproblem, solver: QpSolver, tolerance: float = TOLERANCE
+    qp: Subproblem, solver: QpSolver, tolerance: float = TOLERANCE, guess: ActiveSet | None = None
 ) -> Answer | Unsolved:
-    """To this tolerance of its residuals, absolute and relative."""
-    return _solve(qp, solver, tolerance, stages=True)
+    """To this tolerance of its residuals, absolute and relative; or wholly, where a guess of what
+    is active is nearly right."""
+    return _solve(qp, solver, tolerance, guess)
 
 
 def solve_elastic(qp: Subproblem, gamma: float, solver: QpSolver) -> Answer | Unsolved:
@@ -81,7 +86,7 @@ def solve_elastic(qp: Subproblem, gamma: float, solver: QpSolver) -> Answer | Un
         lower=np.concatenate([qp.lower, np.zeros(slacks)]),
         upper=np.concatenate([qp.upper, np.full(slacks, np.inf)]),
     )
-    found = _solve(wide, solver, TOLERANCE, stages=False)
+    found = _solve(wide, solver, TOLERANCE, None, stages=False)
     if isinstance(found, Unsolved):
         return found
     excess = float(np.maximum(found.p[n:], 0.0).sum())
@@ -98,17 +103,25 @@ def least_violation(qp: Subproblem, largest: np.ndarray, solver: QpSolver) -> fl
     return None if isinstance(found, Unsolved) else found.excess
 
 
-def _solve(qp: Subproblem, solver: QpSolver, tolerance: float, stages: bool) -> Answer | Unsolved:
+def _solve(
+    qp: Subproblem,
+    solver: QpSolver,
+    tolerance: float,
+    guess: ActiveSet | None,
+    stages: bool = True,
+) -> Answer | Unsolved:
     P = csc_array((qp.P.data / qp.unit, qp.P.indices, qp.P.indptr), shape=qp.P.shape)
     scaled = QuadraticProgram(P, qp.q / qp.unit, qp.A, qp.b, qp.G, qp.h, qp.lower, qp.upper)
-    found = solver.solve(scaled, tolerance, stages)
+    found = solve_active(scaled, guess, TOLERANCE) if guess else None
+    loose = not found and tolerance > TOLERANCE
+    found = found or solver.solve(scaled, tolerance, stages)
     if found.x is None:
         return Unsolved(found.infeasible)
     nu = qp.unit * found.z_bounds
     p, lam, mu = _snapped(qp, found.x, nu), qp.unit * found.y, qp.unit * np.maximum(found.z, 0.0)
     if not all(np.isfinite(part).all() for part in (p, lam, mu, nu)):
         return Unsolved(infeasible=False)
-    return Answer(p, lam, mu, nu)
+    return Answer(p, lam, mu, nu, active_set(scaled, found), loose)
 
 
 def _snapped(qp: Subproblem, p: np.ndarray, nu: np.ndarray) -> np.ndarray:

@@ -186,6 +186,11 @@ class Brachistochrone(Lab[BrachistochroneParams, BrachistochroneState]):
         draw_race(scene, params, race, race.at(t).point, t)
         draw_optimiser(scene, params, state.history)
 
+    @classmethod
+    def prepare(cls) -> None:
+        """The solver."""
+        sqp.prepare()
+
     def _race(
         self, params: BrachistochroneParams, state: BrachistochroneState
     ) -> tuple[Race, float]:

@@ -202,7 +202,8 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
 
     @classmethod
     def prepare(cls) -> None:
-        """The regulator's recursion."""
+        """The solver, and the regulator's recursion."""
+        sqp.prepare()
         riccati.prepare()
 
 

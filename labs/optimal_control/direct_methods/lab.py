@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from labs.algorithms import riccati
+from labs.algorithms import riccati, sqp
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot
 from labs.optimal_control.direct_methods.methods import METHODS, SHORT
 from labs.optimal_control.direct_methods.params import DirectMethodsParams
@@ -167,7 +167,8 @@ class DirectMethodsLab(Lab[DirectMethodsParams, DirectMethodsState]):
 
     @classmethod
     def prepare(cls) -> None:
-        """The regulator's recursion, and an iteration of each method."""
+        """The solver, the regulator's recursion, and an iteration of each method."""
+        sqp.prepare()
         riccati.prepare()
         params = DirectMethodsParams(pieces=4.0, segments=2.0, steps=1.0)
         race = lined_up(params)

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from labs.algorithms import sqp
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.optimal_control.families.params import FamiliesParams
 from labs.optimal_control.families.picture import draw_bodies, draw_values, state_at
@@ -143,6 +144,7 @@ class Families(Lab[FamiliesParams, FamiliesState]):
     @classmethod
     def prepare(cls) -> None:
         """All that is compiled, on the smallest grids."""
+        sqp.prepare()
         params = FamiliesParams(nodes=21.0, hjb_steps=5.0, dp_steps=5.0, horizon=0.5)
         for _ in solve_side_by_side(
             params, no_results(params).motions, dict.fromkeys(METHODS, 0.0)

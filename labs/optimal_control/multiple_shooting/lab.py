@@ -185,7 +185,8 @@ class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
 
     @classmethod
     def prepare(cls) -> None:
-        """One iteration of each kind."""
+        """The solver, and one iteration of each kind."""
+        sqp.prepare()
         for hessian in ("gauss-newton", "exact"):
             params = MultipleShootingParams(pieces=4.0, segments=2.0, steps=1.0, hessian=hessian)
             lab = cls()

@@ -209,7 +209,8 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
 
     @classmethod
     def prepare(cls) -> None:
-        """One iteration of each kind, and the recursion that tracks a plan."""
+        """The solver, one iteration of each kind, and the recursion that tracks a plan."""
+        sqp.prepare()
         riccati.prepare()
         for hessian in ("gauss-newton", "exact"):
             params = SingleShootingParams(pieces=3.0, steps=1.0, hessian=hessian)

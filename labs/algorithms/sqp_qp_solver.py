@@ -17,6 +17,9 @@ MOST_ITERATIONS = 100
 """Of the solver, which otherwise needs 10 to 30: what takes more has gone astray."""
 BALANCINGS = 3
 """Of rows and columns, to scale a programme: more take time and save no iteration."""
+GAP = 0.3
+"""Tolerance of the duality gap, in parts of that of the residuals: with a smaller one an SQP needs
+as many iterations, and more of the solver's."""
 REMEMBERED = 4
 """Structures: a step asks for one, its elastic mode for two more."""
 NARROW = 4
@@ -59,7 +62,7 @@ class QpSolver:
         self._known: list[_Structure] = []
 
     def solve(self, qp: QuadraticProgram, tolerance: float, stages: bool = True) -> Solution:
-        """To this tolerance of the residuals, absolute and relative, and a tenth of it of the
+        """To this tolerance of the residuals, absolute and relative, and GAP of it of the
         duality gap; by stages, if they are wanted and the order of the variables allows it, and if
         that fails in general."""
         known = next((s for s in self._known if s.wanted == stages and s.fits(qp)), None)
@@ -105,7 +108,7 @@ class _Structure:
         """One of them."""
         settings = self._solver.settings
         settings.eps_abs = settings.eps_rel = tolerance
-        settings.eps_duality_gap_abs = settings.eps_duality_gap_rel = 0.1 * tolerance
+        settings.eps_duality_gap_abs = settings.eps_duality_gap_rel = GAP * tolerance
         P, A, G = self._matrices
         (self._solver.update if self._begun else self._solver.setup)(
             P.matrix(qp.P),

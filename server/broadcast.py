@@ -153,9 +153,10 @@ class Broadcast:
         if wanted and self._is_due("fields", now, FIELDS):
             known = named_values(world)
             fields = {name: known[name] for name in self._fields if name in known}
-        now_row = None if len(rows) else self._current_row()
-        if len(rows):
+        if len(rows) and controls.moving:
             self._measured = world.state, world.params
+        # A world that has come to a halt was perhaps changed after its last row.
+        now_row = self._current_row()
         if controls.viewers and (len(rows) or fields or now_row is not None):
             # float32 halves the text; a plot has no use for more digits.
             sample = Telemetry(world.runs, rows.astype("float32"), now_row, fields)

@@ -155,6 +155,21 @@ def test_numbers_follow_the_solver_while_the_world_stands_still(served: Served) 
         assert back["rows"] == [], "what is looked at is not recorded"
 
 
+def test_numbers_are_the_last_ones_where_a_solver_brings_the_world_to_a_halt(
+    served: Served,
+) -> None:
+    """The weights of Baird's star diverge; the last row was measured before."""
+    star = {"world": "star", "alpha": 0.01, "updates": 5000.0}
+    with served.session("function-approximation", params=star) as session:
+        with session.stream() as stream:
+            status = stream.next("status", lambda s: s["trouble"])
+        with session.stream() as stream:
+            at = stream.next("hello")["columns"].index("learned")
+            session.command("reset")
+            updates = 50.0 * status["solver"]["latest"]
+            assert stream.next("telemetry", lambda m: m["now"] and m["now"][at] == updates)
+
+
 def test_a_lab_without_a_solver_says_so(served: Served) -> None:
     with served.session("troublesome") as session:
         assert standing(session) is None

@@ -5,8 +5,9 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from html import escape
+from html import escape, unescape
 from typing import Any
+from xml.etree import ElementTree
 
 from markdown_it import MarkdownIt
 from markdown_it.renderer import RendererHTML
@@ -22,6 +23,11 @@ from server import experiments
 from server.experiments import Experiment
 from server.formulas import ArticleError, tex
 from server.line_breaks import statements
+
+GREEK = frozenset("αβγδεϵζηθϑικλμνξπρσςτυφϕχψω")
+NAMED = re.compile("&(?!lt;|gt;|amp;)[A-Za-z]+;")
+"""Characters that XML has no names for."""
+SCRIPTS = frozenset({"msub", "msup", "msubsup", "munder", "mover", "munderover"})
 
 
 @dataclass(frozen=True)
@@ -84,7 +90,9 @@ class _Writer:
         """In pieces, between which a narrow column breaks the line."""
         source = tokens[i].content
         lines = [[tex(piece, True) for piece in pieces] for pieces in statements(source)]
-        spans = [f"<span>{self.symbols.mark('<wbr>'.join(pieces))}</span>" for pieces in lines]
+        spans = [
+            f"<span>{'<wbr>'.join(map(self.symbols.display, pieces))}</span>" for pieces in lines
+        ]
         return f'<div class="formula">{" ".join(spans)}</div>\n'
 
     def _table_open(self, *_: Any) -> str:
@@ -131,9 +139,11 @@ class _Symbols:
         named = {name: t for name, t in params.tunables.items() if t.symbol}
         self.labels = {name: t.label for name, t in named.items()}
         self.names = {t.symbol.strip(): name for name, t in named.items()}
-        # A bare letter inside a formula may be part of another symbol: those stay unmarked.
-        structured = {_inner(tex(t.symbol)): name for name, t in named.items()}
-        self.parts = {part: name for part, name in structured.items() if part.count("<") > 2}
+        whole = {_inner(tex(t.symbol)): name for name, t in named.items()}
+        self.parts = {part: name for part, name in whole.items() if part.count("<") > 2}
+        # A Latin letter inside a formula may be an index or a matrix as well: those stay unmarked.
+        single = {re.sub("</?mi>", "", part): name for part, name in whole.items()}
+        self.greek = {letter: name for letter, name in single.items() if letter in GREEK}
 
     def inline(self, source: str) -> str:
         name = self.names.get(source.strip())
@@ -146,11 +156,33 @@ class _Symbols:
             f' aria-label="{label}">{shown}</span>'
         )
 
+    def display(self, formula: str) -> str:
+        """Of a formula that stands alone: there a letter is itself, not what a text sets it to."""
+        if any(f"<mi>{letter}</mi>" in formula for letter in self.greek):
+            root = ElementTree.fromstring(NAMED.sub(lambda found: unescape(found[0]), formula))
+            self._mark_letters(root)
+            formula = ElementTree.tostring(root, encoding="unicode")
+        return self.mark(formula)
+
     def mark(self, formula: str) -> str:
         for part, name in self.parts.items():
             marked = f'<mrow class="symbol" data-param="{name}">{part}</mrow>'
             formula = formula.replace(part, marked)
         return formula
+
+    def _mark_letters(self, element: ElementTree.Element) -> None:
+        """Greek ones but in scripts, and with a subscript or an accent: these are other symbols."""
+        parts = list(element)
+        if element.tag in SCRIPTS:
+            parts = [] if element.tag != "msup" else parts[:1]
+        for part in parts:
+            name = self.greek.get(part.text or "") if part.tag == "mi" else None
+            if name is None:
+                self._mark_letters(part)
+                continue
+            marked = ElementTree.Element("mrow", {"class": "symbol", "data-param": name})
+            marked.append(part)
+            element[list(element).index(part)] = marked
 
 
 def _escape_number(text: str) -> str:

@@ -119,6 +119,22 @@ def test_a_symbol_with_a_slider_names_it(entry: Entry) -> None:
     assert '<mrow class="symbol" data-param="kp"><msub><mi>k</mi><mi>p</mi></msub></mrow>' in html
 
 
+def test_a_greek_letter_in_a_formula_that_stands_alone_is_its_knob() -> None:
+    """But not in a script, with a subscript or an accent, nor where a text sets it to a number."""
+    lab = catalog()["td-lambda"]
+
+    def html(text: str) -> str:
+        return render_text(lab, text).html
+
+    gamma = '<mrow class="symbol" data-param="gamma"><mi>\u03b3</mi></mrow>'
+    assert gamma + "<mi>V</mi>" in html("$$J = \\gamma V$$")
+    assert f"<msup>{gamma}<mi>k</mi></msup>" in html("$$J = \\sum_{k=0}^N \\gamma^k l_k$$")
+    for other in ("x^\\gamma", "\\gamma_1", "\\hat\\gamma", "\\sum_\\gamma x"):
+        assert "data-param" not in html(f"$${other}$$"), other
+    assert "data-param" not in html("with $\\gamma = 1$")
+    assert "\u2061" in html("$$\\sin \\gamma$$")  # applies the function
+
+
 def test_an_experiment_is_read_and_shown(entry: Entry) -> None:
     article = write(entry, experiment('watch = "Error"\n[set]\nkp = 200.0\n'))
     (found,) = article.experiments

@@ -23,8 +23,9 @@ When = Choices | Sequence[Choices]
 # A logarithmic slider that reaches zero bends to linear below high / LOG_SPAN.
 LOG_SPAN = 1000.0
 TEXT_LENGTH = 400
-LONGEST_TEXT = 4000
-"""A link holds it: three bytes for a letter in most alphabets, three characters for a byte."""
+LONGEST_TEXT = 32_000
+"""Half of what a request may hold, for line ends and quotes are two characters there; a link leaves
+out what is too long for it."""
 ALWAYS: When = ()
 NO_UNITS: Mapping[str, Mapping[Value, str]] = {}
 

@@ -33,6 +33,7 @@ const column = new KnobColumn(lab, knobs);
 const symbols = new Symbols(lab, knobs);
 const experiments = new Experiments(lab, apply, board, (names) => column.highlight(names));
 let link = location.href;
+let leftOut = {}; // by name: what is too long for it
 new Saving(board, aboutFigure, () => session.info?.id);
 printFigures(() => board.shelf.shown, aboutFigure);
 
@@ -63,7 +64,7 @@ const actions = {
   faster: () => transport.faster(1),
   slower: () => transport.faster(-1),
   clear: () => board.clear(),
-  share: () => copy(address(), "Link copied: it opens this lab with these parameters."),
+  share: () => copy(address(), "Link copied: it opens this lab with these parameters.", leftOutOfLink()),
   command: copyCommand,
   full: () => stage.fullScreen(),
   view: () => send({ command: "reset_view" }),
@@ -74,6 +75,12 @@ const actions = {
 // Where the page opens as it is now.
 function address() {
   return new URL(link, location.href).href;
+}
+
+// A sentence on what the link lacks, if anything.
+function leftOutOfLink() {
+  const names = lab.params.filter(({ name }) => name in leftOut).map(({ label }) => label);
+  return names.length ? ` Without ${names.join(", ")}, too long for a link: pass that text on beside it.` : "";
 }
 
 // What a figure says beneath its plots.
@@ -89,13 +96,13 @@ async function copyCommand() {
   else toast(data?.error ?? "The server does not answer.");
 }
 
-async function copy(text, done) {
+async function copy(text, done, note = "") {
   try {
     await navigator.clipboard.writeText(text);
-    toast(done);
+    toast(done + note);
   } catch {
     // The clipboard needs a secure page; the text is then shown to be copied by hand.
-    toast(text, 30);
+    toast(text + note, 30);
   }
 }
 
@@ -169,8 +176,8 @@ session.addEventListener("status", ({ detail: status }) => {
   column.show();
   symbols.show();
   board.choose(status.params);
-  link = linkOf(lab.params, status.params, status.seed);
-  writeLink(link);
+  ({ link, left: leftOut } = linkOf(lab.params, status.params, status.seed));
+  writeLink(link, leftOut);
   if (status.trouble) {
     stage.say(status.trouble, { warn: true, buttons: { Reset: actions.reset, Defaults: actions.defaults } });
   } else if (!recovering) {

@@ -1,7 +1,10 @@
 """A problem of one's own on the page: from a file that is dropped or chosen to its policy."""
 
+import json
+import re
 from pathlib import Path
 
+import gymnasium
 from playwright.sync_api import Page, expect
 
 from labs.tasks.mdp_table.params import TAXICAB
@@ -34,6 +37,19 @@ def test_a_table_is_dropped_and_a_map_is_chosen_as_a_file(page: Page, tmp_path: 
     note = lab.pin("Policy by state")
     expect(note).to_contain_text("A: stand, V = −121.653")
     expect(note).to_contain_text("B: stand, V = −135.306")
+
+    # A link leaves out what is too long for it, and says so; the page has it all the same.
+    lake = gymnasium.make("FrozenLake-v1", map_name="8x8").unwrapped.P  # type: ignore[attr-defined]
+    page.evaluate(DROP, ["param-table", "lake.json", json.dumps(lake)])
+    expect(lab.pin("The world")).to_contain_text("64 states")
+    page.wait_for_function("history.state?.left?.table")
+    assert "&table=" not in page.url
+    page.locator("[data-do=share]").click()
+    expect(page.locator(".toast").last).to_contain_text("Without Your table, too long for a link")
+    page.reload()
+    lab.wait_live()
+    expect(lab.pin("The world")).to_contain_text("64 states")
+    expect(page).to_have_url(re.compile("gamma=0.9"))
 
     lab.value("world").select_option(label="Grid world")
     file = tmp_path / "lake.txt"

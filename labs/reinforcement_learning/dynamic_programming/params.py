@@ -12,7 +12,7 @@ from labs.reinforcement_learning.dynamic_programming.tasks import (
     table_key,
 )
 from labs.tasks.grid_world.params import MAP_LENGTH, MapText
-from labs.tasks.mdp_table.params import TAXICAB, TableText
+from labs.tasks.mdp_table.params import TABLE_LENGTH, TAXICAB, TableText
 
 POCKET = """\
 .............
@@ -65,7 +65,7 @@ class DynamicProgrammingParams(Params):
     """What any step costs, beside what the cell costs that it leads to."""
     kings: bool = GRID_WORLD.toggle(False, "Diagonal steps")
     """Eight controls, the king's moves, instead of four."""
-    table: TableText = TABLE.text(TAXICAB, "Your table", rows=8, max_length=4000, key=True)
+    table: TableText = TABLE.text(TAXICAB, "Your table", rows=8, max_length=TABLE_LENGTH, key=True)
     """CSV or JSON, pasted or a file: from, action, to, probability, cost or reward, a row for each
     transition; or state, action, cost, then a column for each state. Start: the first state; what
     has no row is an end."""

@@ -6,6 +6,7 @@ from typing import Annotated
 from labs.params import Group, Params, readable
 from labs.reinforcement_learning.markov.chains import TITLES, chain_table, parse_rows
 from labs.reinforcement_learning.markov.reward_process import Edit, RewardProcess, reward_process
+from labs.tasks.mdp_table.params import TABLE_LENGTH
 from labs.tasks.mdp_table.table import parse_table
 
 MAX_SHOWN_STATES = 12
@@ -37,7 +38,7 @@ class MarkovParams(Params):
         "Snow, 3, 0, 1/2, 1/2",
         "Your table",
         rows=5,
-        max_length=4000,
+        max_length=TABLE_LENGTH,
         when={"chain": "table"},
     )
     """CSV: a heading (state, control if any, cost, the states), then a row each, or from, to,

@@ -15,7 +15,7 @@ from labs.reinforcement_learning.td_control.tasks import (
 )
 from labs.tasks.grid_world.map import MAPS
 from labs.tasks.grid_world.params import MAP_LENGTH, MapText
-from labs.tasks.mdp_table.params import TAXICAB, TableText
+from labs.tasks.mdp_table.params import TABLE_LENGTH, TAXICAB, TableText
 
 LEARNING_METHODS = {
     "q-learning": "Q-learning",
@@ -63,7 +63,12 @@ class TdParams(Params):
     cost 1; a last row of digits is wind, upwards; below, costs of letters: m = cost 3, or
     T = reward 5, end."""
     table: TableText = WORLD.text(
-        TAXICAB, "Your table", rows=8, max_length=4000, effect="restart", when={"system": "table"}
+        TAXICAB,
+        "Your table",
+        rows=8,
+        max_length=TABLE_LENGTH,
+        effect="restart",
+        when={"system": "table"},
     )
     """CSV or JSON, pasted or a file: from, action, to, probability, cost or reward, a row for each
     transition; or state, action, cost, then a column for each state. Start: the first state; what

@@ -5,6 +5,7 @@ from typing import Annotated
 
 from labs.params import readable
 from labs.tasks.mdp_table.table import parse_table
+from labs.tunables import LONGEST_TEXT
 
 TAXICAB = """from, action, to, probability, reward
 A, cruise, A, 1/2, 10
@@ -34,6 +35,7 @@ C, radio, C, 3/16, 8"""
 no radio."""
 TABLES: Mapping[str, str] = {"Taxicab": TAXICAB}
 
-
+TABLE_LENGTH = LONGEST_TEXT
+"""Characters: 100 states in wide form, and the dictionary P of FrozenLake's 64."""
 TableText = Annotated[str, readable(parse_table)]
 """The type of a field of Params that holds a table; what is none is refused in a sentence."""

@@ -17,7 +17,8 @@ Long, a row for each transition:
 
 In JSON a list of such rows, {"state": "A", "control": "go", "cost": 3, "to": {"A": 0.2, "B": 0.8}}
 or {"from": "A", "action": "go", "to": "B", "probability": 0.8, "reward": -3}, or the dictionary P
-of Gymnasium's environments, {"0": {"1": [[probability, next state, reward, terminated], ...]}}.
+of Gymnasium's environments, {"0": {"1": [[probability, next state, reward, terminated], ...]}},
+also as Python prints it.
 
 The order of the rows is the order of the states; an episode starts in the first. Costs may be left
 out (0), and so may probabilities that are 0, or in a long row 1. A reward is a negative cost. A
@@ -29,6 +30,7 @@ Rows are counted from 1 below the heading; errors name them.
 import csv
 import io
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -50,6 +52,7 @@ HEADINGS = {
     "end": ("terminal", "terminated", "done", "end"),
 }
 """What the columns of a long table may be called, ..."""
+MEANT = {word: name for name, words in HEADINGS.items() for word in words}
 HEADINGS_OF_WIDE = {"state": "state", "from": "state", "control": "control", "action": "control"}
 HEADINGS_OF_WIDE |= {"cost": "cost", "reward": "reward"}
 """... and of a wide one, whose other columns are states."""
@@ -91,16 +94,15 @@ def _read_csv(text: str, rewarded: list[str]) -> Iterator[Entry]:
     mark = ""
     if lines and lines[0].strip().strip('"').lower().startswith("sep="):
         mark = lines.pop(0).strip().strip('"')[4:5]
-    heading = lines[0] if lines else ""
-    mark = mark or next((mark for mark in "\t;" if mark in heading), ",")
+    mark = mark or next((mark for mark in "\t;" if lines and mark in lines[0]), ",")
     try:
         table = csv.reader(io.StringIO("\n".join(lines)), delimiter=mark, skipinitialspace=True)
         cells = [[cell.strip() for cell in line] for line in table]
     except (csv.Error, TypeError) as error:
         raise LabError(f"the table cannot be read: {error}") from None
     cells = [line for line in cells if any(line)]
-    columns = _without_trailing(cells[0]) if cells else []
-    columns, long = _columns(columns)
+    heading = _without_trailing(cells[0]) if cells else []
+    columns, long = _columns(heading, cells[1:])
     for number, line in enumerate(cells[1:], 1):
         if len(line) > len(columns):
             line = line[: len(columns)] + _without_trailing(line[len(columns) :])
@@ -117,11 +119,11 @@ def _read_csv(text: str, rewarded: list[str]) -> Iterator[Entry]:
         yield _entry(number, row, rewarded, "to" if long else "")
 
 
-def _columns(columns: Sequence[str]) -> tuple[list[str], bool]:
+def _columns(columns: Sequence[str], rows: Sequence[list[str]]) -> tuple[list[str], bool]:
     """The columns by the names used here, and whether the table is long."""
-    meant = {word: name for name, words in HEADINGS.items() for word in words}
     lower = [column.lower() for column in columns]
-    named = [meant.get(column, "") for column in lower]
+    named = [MEANT.get(column, "") for column in lower]
+    _check_headings(columns, named, rows)
     long = "to" in named and all(named)
     if not long:
         named = [HEADINGS_OF_WIDE.get(low, own) for low, own in zip(lower, columns, strict=True)]
@@ -136,6 +138,24 @@ def _columns(columns: Sequence[str]) -> tuple[list[str], bool]:
     return named, long
 
 
+def _check_headings(
+    columns: Sequence[str], named: Sequence[str], rows: Sequence[list[str]]
+) -> None:
+    """Raises LabError where a column means nothing here and is no state with a row of its own, and
+    the table is long all the same, or its cells are no probabilities."""
+    have_rows = {row[0] for row in rows}
+    strange = [
+        k for k, own in enumerate(columns) if k and own and not named[k] and own not in have_rows
+    ]
+    cells = (row[k] for row in rows for k in strange if k < len(row))
+    if strange and ("to" in named or any(re.match(r"[^\W\d]", cell) for cell in cells)):
+        raise LabError(
+            f"{', '.join(shorten(columns[k]) for k in strange[:5])}? The columns of a table are "
+            "from, action, to, probability, cost or reward, terminal; or state, action, cost, and "
+            "one for each state, which has a row"
+        )
+
+
 def _without_trailing(cells: Sequence[str]) -> list[str]:
     """Cells without the empty ones that delimiters at the end of a line make."""
     kept = list(cells)
@@ -146,26 +166,44 @@ def _without_trailing(cells: Sequence[str]) -> list[str]:
 
 def _read_json(text: str, rewarded: list[str]) -> Iterator[Entry]:
     try:
-        rows = json.loads(text, parse_int=float)
+        rows = json.loads(_json_of_python(text), parse_int=float)
     except (ValueError, RecursionError) as error:
         raise LabError(f"the table is not sound JSON: {error}") from None
     if isinstance(rows, dict):
         rows = list(_gymnasium_rows(rows))
     for number, row in enumerate(rows, 1):
-        if not isinstance(row, dict) or not isinstance(row.get("to"), dict | str | float):
+        named = _by_meaning(row) if isinstance(row, dict) else {}
+        if not isinstance(named.get("to"), dict | str | float):
             raise LabError(
                 f'row {number}: a row is {{"state": "A", "cost": 1, "to": {{"A": 1}}}}, '
                 'with a "control" where there are any; or {"from": "A", "to": "A", '
                 '"probability": 1}'
             )
-        meant = {word: name for name, words in HEADINGS.items() for word in words}
-        strange = [key for key in row if key.lower() not in meant]
+        strange = [shorten(key) for key in named if key not in HEADINGS]
         if strange:
             raise LabError(
-                f"row {number}: {', '.join(sorted(strange))}? A row has state, control, cost, to"
+                f"row {number}: {', '.join(sorted(strange)[:5])}? A row has state, control, cost, "
+                "to, or from, action, to, probability, reward, terminal, each once"
             )
-        named = {meant[key.lower()]: value for key, value in row.items()}
         yield _entry(number, named, rewarded, "" if isinstance(named["to"], dict) else "to")
+
+
+def _by_meaning(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A row by the names used here; what is strange, or there twice, by its own."""
+    named: dict[str, Any] = {}
+    for key, value in row.items():
+        meant = MEANT.get(key.strip().lower(), key)
+        named[f"{key} again" if meant in named else meant] = value
+    return named
+
+
+def _json_of_python(text: str) -> str:
+    """JSON of a dictionary P that was printed: {0: {1: [(1.0, np.int64(0), -1, False)]}}."""
+    if not re.match(r"\s*\{\s*\d", text):
+        return text
+    text = re.sub(r"\b(?:np|numpy)\.\w+\(([^()]*)\)", r"\1", text)
+    text = re.sub(r"\b(\d+)\s*:", r'"\1":', text).translate(str.maketrans("()", "[]"))
+    return re.sub(r"\b(?:True|False)\b", lambda found: found[0].lower(), text)
 
 
 def _gymnasium_rows(P: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:

@@ -16,6 +16,8 @@ SUM_TOLERANCE = 1e-6
 """How far a row may be from summing to 1: somebody wrote 0.333333."""
 MAX_STATES, MAX_CONTROLS = 100, 20
 """Of a table."""
+NAMED = 12
+"""States at most that a message lists."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +65,7 @@ def parse_table(text: str, most: int = MAX_STATES) -> Table:
     entries, notes = read_entries(text)
     if not entries:
         raise LabError("the table has no rows: it needs one for each state")
-    named = [entry.state for entry in entries]
+    named = dict.fromkeys(entry.state for entry in entries)
     ends = dict.fromkeys(y for entry in entries if entry.long for y in entry.to if y not in named)
     states = tuple(dict.fromkeys([*named, *ends]))
     controls = tuple(dict.fromkeys(e.control for e in entries if e.control)) or ("",)
@@ -96,7 +98,7 @@ def _filled(
             if name not in place:
                 raise LabError(
                     f"{entry.name}: it leads to {name!r}, which has no row; "
-                    f"the states are {', '.join(states)}"
+                    f"the states are {', '.join(states[:NAMED])}{', ...' * (len(states) > NAMED)}"
                 )
             p[place[name]] += value
         if not entry.long:

@@ -1,7 +1,10 @@
 """Tables that are typed or pasted: what they mean, and that each mistake is named."""
 
 import json
+from collections.abc import Callable
+from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,6 +12,8 @@ from hypothesis import strategies as st
 
 from labs.errors import LabError
 from labs.problems.finite_mdp import random_policy
+from labs.reinforcement_learning.dynamic_programming.params import DynamicProgrammingParams
+from labs.reinforcement_learning.td_control.params import TdParams
 from labs.tasks.mdp_table.table import Table, parse_table
 
 CHAIN = "state, cost, A, B\nA, 1, 1/2, 0.5\nB, 0, 0, 1\n"
@@ -108,6 +113,8 @@ def test_rounded_rows_are_scaled_to_sum_to_one() -> None:
         ("[" * 3000, "not sound JSON"),
         ('[{"state": "A", "to": [1]}]', "row 1: a row is"),
         ('[{"state": "A", "to": {"A": 1}, "goto": 2}]', "row 1: goto? A row has"),
+        ('[{"next": "A", "to": "A", "from": "A"}]', "row 1: to again? A row has"),
+        ('[{"from": "A", "From": "B", "to": "A"}]', "row 1: From again? A row has"),
         ('[{"to": {"A": 1}}]', "row 1: it does not name its state"),
         ('[{"state": "A", "to": {"A": null}}]', "row 1 (A): 'None' for A is not a number"),
         ('[{"state": "A", "to": {"A": NaN}}]', "row 1 (A): 'nan' for A is not a number"),
@@ -118,6 +125,20 @@ def test_a_mistake_is_named(text: str, said: str) -> None:
     with pytest.raises(LabError) as refused:
         parse_table(text)
     assert said in str(refused.value)
+
+
+def test_a_state_may_be_named_like_a_column() -> None:
+    table = parse_table("state, cost, to, B\nto, 1, 0.5, 0.5\nB, 0, 0, 1")
+    assert table.states == ("to", "B")
+
+
+def test_messages_list_some_states_only() -> None:
+    names = [f"a long name, and the {k} th" for k in range(100)]
+    rows = [{"state": name, "to": {name: 1}} for name in names]
+    rows[0]["to"] = {"elsewhere": 1}
+    with pytest.raises(LabError, match=r"leads to 'elsewhere', which has no row") as refused:
+        parse_table(json.dumps(rows))
+    assert len(str(refused.value)) < 500
 
 
 def test_too_many_states() -> None:
@@ -174,6 +195,60 @@ def test_a_row_for_each_transition(text: str) -> None:
     assert any("Rewards" in note for note in found.notes) == rewarded
 
 
+def test_json_has_the_names_that_csv_has() -> None:
+    keys = [("state", "action", "next_state", "prob", "cost"), ("From", "Action", "To", "P", "C"),
+            ("s", "a", "s'", "Chance", "l")]  # fmt: skip
+    rows = [["A", "stay", "A", 1, 1], ["A", "go", "A", "20 %", 3], ["A", "go", "B", 0.8, 3]]
+    for names in keys:
+        assert same(
+            parse_table(json.dumps([dict(zip(names, row, strict=True)) for row in rows])),
+            parse_table(LONG),
+        )
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "states"),
+    [
+        ("FrozenLake-v1", {}, 16),
+        ("FrozenLake-v1", {"map_name": "8x8"}, 64),
+        ("CliffWalking-v1", {}, 48),
+    ],
+)
+@pytest.mark.parametrize(
+    "write", [lambda P: json.dumps(P, default=int), str], ids=["json", "print"]
+)
+def test_dictionaries_of_gymnasium_fit(
+    name: str, settings: dict[str, Any], states: int, write: Callable[[object], str]
+) -> None:
+    P = gymnasium.make(name, **settings).unwrapped.P  # type: ignore[attr-defined]
+    text = write(P)
+    for params in (DynamicProgrammingParams(table=text), TdParams(table=text)):
+        table = parse_table(params.table)
+    assert table.states == tuple(map(str, range(states)))
+    for x, controls in P.items():
+        for u, outcomes in controls.items():
+            expected, cost = np.zeros(states), 0.0
+            for p, y, reward, _ in outcomes:
+                expected[y] += p
+                cost -= p * reward
+            if not table.terminal[x]:
+                np.testing.assert_allclose(table.P[u, x], expected, atol=1e-12)
+                assert table.C[x, u] == pytest.approx(cost, abs=1e-12)
+    ends = {y for controls in P.values() for o in controls.values() for _, y, _, end in o if end}
+    assert set(np.flatnonzero(table.terminal)) == ends
+
+
+def test_a_hundred_states_fit_in_wide_form() -> None:
+    names = [f"s{k}" for k in range(100)]
+    rows = [
+        ", ".join([name, "1", *("1" if k == (x + 1) % 100 else "0" for k in range(100))])
+        for x, name in enumerate(names)
+    ]
+    text = "\n".join([", ".join(["state", "cost", *names]), *rows])
+    assert len(text) > 20_000
+    assert len(parse_table(DynamicProgrammingParams(table=text).table).states) == 100
+
+
 def test_costs_of_transitions_are_expected_ones() -> None:
     table = parse_table("from,to,probability,reward\nA,A,1/4,8\nA,B,3/4,-4\nB,A,,")
     np.testing.assert_allclose(table.C, [[1.0], [0.0]])
@@ -222,6 +297,9 @@ def test_rounding_is_forgiven() -> None:
         ("from,to,done\nA,A,perhaps", "'perhaps' for terminal is neither true nor false"),
         ("from,to,p,to\nA,A,1,A", "a name of its own"),
         ("from,action,to\n" + "\n".join(f"A,u{k},A" for k in range(21)), "21 controls: at most 20"),
+        (LONG.replace("probability", "probability [%]"), "probability [%]? The columns of a table"),
+        (LONG.replace(" to,", " destination,"), "destination? The columns of a table are from,"),
+        (LONG.replace("cost", "euros"), "euros? The columns of a table are from, action, to"),
         ('{"0": {"0": [[1, 0]]}}', "has for each state and control its outcomes"),
     ],
 )

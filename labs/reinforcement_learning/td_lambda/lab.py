@@ -161,6 +161,9 @@ class TdLambda(Lab[TdLambdaParams, TdLambdaState]):
             **sweep_curves(params, state.sweep),
         }
 
+    def notes(self, params: TdLambdaParams, state: TdLambdaState) -> Mapping[str, str]:
+        return {"about": "\n".join(params.place.about)}
+
     def labels(self, params: TdLambdaParams) -> Mapping[str, str | tuple[str, ...]]:
         names = [METHODS[name] for name in params.methods]
         if len(set(names)) < len(names):

@@ -10,7 +10,7 @@ from labs.params import Group, Params, When
 from labs.problems.episodes import UpdateRule
 from labs.reinforcement_learning.td_lambda.tasks import Place, grid_place, walk_place
 from labs.tasks.grid_world.map import MAPS, grid_world
-from labs.tasks.grid_world.params import MapText
+from labs.tasks.grid_world.params import MAP_LENGTH, MapText
 
 METHODS = {
     "n-step": "n-step TD",
@@ -70,8 +70,10 @@ class TdLambdaParams(Params):
         "walk", {"walk": "19 states", "grid": "Grid world"}, "Walk", key=True
     )
     """Left or right by chance until an end is reached, or through rooms to the goal."""
-    map: OpenMap = WORLD.text(MAPS["room"], "Map", rows=8, when=GRID)
-    """S start, G goal, # wall, C cliff, . free; a last row of digits is wind, upwards."""
+    map: OpenMap = WORLD.text(MAPS["room"], "Map", rows=8, max_length=MAP_LENGTH, when=GRID)
+    """S start, G goal, # wall, H hole (an end for 100), C cliff, . free, + and - ends that gain and
+    cost 1; a last row of digits is wind, upwards; below, costs of letters: m = cost 3, or
+    T = reward 5, end."""
     brush: str = WORLD.choice(
         "#",
         {"#": "walls up", "G": "moves the goal", "S": "moves the start", "C": "makes cliff"},

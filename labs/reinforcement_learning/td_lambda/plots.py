@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labs.plots import Bars, Curves, HeatMap, Line, Plot, Readout, TimeSeries, Trace
+from labs.plots import Bars, Curves, HeatMap, Line, Note, Plot, Readout, TimeSeries, Trace
 from labs.reinforcement_learning.td_lambda.params import METHODS, TdLambdaParams
 from labs.reinforcement_learning.td_lambda.sweep import (
     ALPHAS,
@@ -73,6 +73,7 @@ PLOTS: tuple[Plot, ...] = (
         log_y=True,
         when=SECOND,
     ),
+    Note("The world", "about", when=GRID),
     Readout("best_error", "Least error", ""),
     Readout("best_alpha", "at α =", ""),
     Readout("best_member", "at {member} =", "", when=FAMILIES),

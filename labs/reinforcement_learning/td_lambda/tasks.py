@@ -26,6 +26,8 @@ class Place:
     """The grid world; None: the walk."""
     steps: float
     """Of an episode, on average, if none is cut."""
+    about: tuple[str, ...]
+    """How large it is, and what of a map was understood otherwise than written, in sentences."""
 
     @property
     def start(self) -> int:
@@ -55,7 +57,8 @@ def walk_place(gamma: float) -> Place:
     mdp = FiniteMDP(free.C, gamma, free.terminal, successor=free.successor)
     policy, start = random_policy(mdp), NINETEEN.start
     task = prediction_task(mdp, policy, exact(mdp, policy), [start], HORIZON)
-    return Place(task, None, float(expected_visits(mdp, policy, start).sum()))
+    steps = float(expected_visits(mdp, policy, start).sum())
+    return Place(task, None, steps, (mdp.report([start]),))
 
 
 @lru_cache(maxsize=16)
@@ -70,4 +73,5 @@ def grid_place(text: str, wander: float, gamma: float) -> Place:
     task = prediction_task(
         mdp, policy, exact(mdp, policy), [world.start], GRID_HORIZON, weight=visits
     )
-    return Place(task, world, float(visits.sum()))
+    about = (mdp.report([world.start]), *world.notes)
+    return Place(task, world, float(visits.sum()), about)

@@ -8,8 +8,8 @@ from labs.params import Value, readable
 from labs.tasks.grid_world.map import MAPS, GridWorld, grid_world
 from labs.tasks.grid_world.picture import BOARD, board
 
-MAP_LENGTH = 2000
-"""Characters: 32 rows of 32 cells, and some lines of costs."""
+MAP_LENGTH = 8000
+"""Characters: 32 rows of 32 cells in quotes, and some lines of costs."""
 BOOK_WORLDS: Mapping[str, Mapping[str, Value]] = {
     "4 x 3 world": {
         "map": MAPS["4x3"], "gamma": 1.0, "slip": 0.2, "sideways": True, "living": 0.04,

@@ -1,5 +1,6 @@
-"""Reading maps as people write them (the letters are in map.py): as plain rows, as a list in
-quotes, with blanks or commas between the cells, in letters of other books.
+"""Reading maps as people write them (the letters are in map.py): as plain rows, as a list of rows
+or of lists of cells in quotes, as NumPy prints one, with blanks or commas between the cells, in
+letters of other books.
 """
 
 import contextlib
@@ -17,6 +18,7 @@ WORDS = {".": "free", "#": "wall"}
 MAX_COST = 1e4
 """Of a cell, either sign."""
 _LEGEND = re.compile(r"\s*(\S)\s*[=:]\s*(\S.*)")
+_QUOTED = re.compile(r"""["']([^"']*)["']""")
 _VALUE = re.compile(r"(?:(cost|reward)\s+)?([-+−]?[\d./]{1,20})", re.IGNORECASE)
 
 
@@ -86,8 +88,7 @@ def _meaning(cell: str, known: Container[str], legend: Container[str]) -> str:
 
 
 def _rows(lines: list[str]) -> list[str]:
-    quoted = re.findall(r"""["']([^"']*)["']""", "\n".join(lines))
-    if quoted:  # a list of strings, as Gymnasium's maps are
+    if quoted := _quoted_rows("\n".join(lines)):
         return quoted
     rows = [line.strip() for line in lines if line.strip()]
     for separated in (re.compile(r"\S(?:,\s*\S)+,?"), re.compile(r"\S(?:\s+\S)+")):
@@ -99,6 +100,26 @@ def _rows(lines: list[str]) -> list[str]:
         lines = [line for line in lines if line.strip()]
         return [line.rstrip().ljust(max(len(one.rstrip()) for one in lines)) for line in lines]
     return rows
+
+
+def _quoted_rows(text: str) -> list[str]:
+    """The rows of strings in quotes: each is one, but where each is a cell, those of an inner list,
+    [["S", "F"], ["H", "G"]], or of a line without lists, "S","F", are. Empty if there are none."""
+    if not _QUOTED.search(text):
+        return []
+    text = re.sub(r",\s*dtype\s*=.*", "", text)
+    if "..." in _QUOTED.sub("", text) and "[" in text:
+        raise LabError(
+            "the list is cut short by '...': in NumPy, set_printoptions(threshold=2000) prints "
+            "all of it"
+        )
+    parts = text.splitlines()
+    if "[" in text:
+        parts = re.findall(r"\[([^\[\]]*)\]", text) if re.search(r"\[\s*\[", text) else []
+    rows = [row for row in map(_QUOTED.findall, parts) if row]
+    if rows and all(len(cell) == 1 for row in rows for cell in row):
+        return ["".join(row) for row in rows]
+    return _QUOTED.findall(text)
 
 
 def _kind(line: str, said: str, ends: bool) -> Kind:

@@ -345,3 +345,12 @@ def test_diverged_values_stop_the_walk_with_a_sentence() -> None:
     assert "Take a smaller step size" in world.trouble
     state = replace(world.state)
     assert LAB.step(params_of(world), Inputs(), state) is state
+
+
+def test_a_map_of_any_size_is_taken_and_what_was_translated_is_said() -> None:
+    corridor = ["#" * 30 + "SF", *["F" * 32] * 30, "F" * 30 + "HG"]
+    world = World(ENTRY, {"system": "grid", "map": "\n".join(corridor)})
+    about = LAB.notes(params_of(world), world.state)["about"]
+    assert about.startswith("994 states and 4 controls, 2 of the states terminal")
+    assert "Read F as . (free)." in about
+    assert "A hole H ends an episode and costs 100" in about

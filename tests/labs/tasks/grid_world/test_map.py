@@ -1,5 +1,9 @@
 """Grid worlds: moves by hand, published maps, editing."""
 
+import json
+from typing import Any
+
+import gymnasium
 import numpy as np
 import pytest
 
@@ -8,6 +12,7 @@ from labs.algorithms.policy_iteration import optimum
 from labs.errors import LabError
 from labs.problems.finite_mdp import FiniteMDP, random_policy
 from labs.tasks.grid_world.map import FALL, MAPS, GridWorld
+from labs.tasks.grid_world.params import MAP_LENGTH
 
 UP, RIGHT, DOWN, LEFT = range(4)
 
@@ -110,13 +115,48 @@ def test_cells_are_edited() -> None:
         ("S,.,#\n.,.,G", "S.#\n..G", ""),
         ('["SFF", "FFG"]', "S..\n..G", "Read F as . (free)."),
         ("S  \n # \n  G", "S..\n.#.\n..G", "Read a space as . (free)."),
+        ('[["S", "F"], ["H", "G"]]\nH = cost 0', "S.\nHG\nH = cost 0", "Read F as . (free)."),
+        ("[[b'S' b'.']\n [b'#' b'G']]", "S.\n#G", ""),
+        ("array([['S', '.'],\n       ['#', 'G']], dtype='<U1')", "S.\n#G", ""),
+        ("array(['S.', '#G'], dtype='<U2')", "S.\n#G", ""),
+        ('"S","."\n"#","G"', "S.\n#G", ""),
+        ('"S.",\n"#G"', "S.\n#G", ""),
+        ('["S", ".", "G"]', "S\n.\nG", ""),
     ],
-    ids=["lake", "spaces", "small letters", "blanks between", "commas", "list", "ends of rows"],
+    ids=[
+        "lake",
+        "spaces",
+        "small letters",
+        "blanks between",
+        "commas",
+        "list",
+        "ends of rows",
+        "lists of cells",
+        "printed bytes",
+        "array of cells",
+        "array of rows",
+        "quoted CSV",
+        "quoted rows",
+        "list of one column",
+    ],
 )
 def test_maps_of_others_are_read(text: str, wanted: str, note: str) -> None:
     world = GridWorld.parse(text)
     assert world.text == wanted
     assert world.notes == ((note,) if note else ())
+
+
+def test_the_description_of_a_gymnasium_map_is_read_and_a_shortened_one_refused() -> None:
+    lake: Any = gymnasium.make("FrozenLake-v1", map_name="8x8").unwrapped
+    for text in (str(lake.desc), repr(lake.desc), json.dumps(lake.desc.astype(str).tolist())):
+        assert GridWorld.parse(text).rows == GridWorld.parse(MAPS["frozen lake 8x8"]).rows
+    large = np.full((32, 32), b".")
+    large[0, 0], large[31, 31] = b"S", b"G"
+    whole = json.dumps(large.astype(str).tolist())
+    assert len(whole) < MAP_LENGTH
+    assert GridWorld.parse(whole).shape == (32, 32)
+    with pytest.raises(LabError, match=r"cut short by '\.\.\.'"):
+        GridWorld.parse(str(large))
 
 
 def test_holes_and_other_ends_end() -> None:

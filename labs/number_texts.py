@@ -5,6 +5,7 @@ first; here a number is a float from the beginning, and its text is short."""
 
 import contextlib
 import math
+import re
 
 LONGEST_NUMBER = 64
 """Characters: 17 digits tell any float, and a fraction has two."""
@@ -28,6 +29,15 @@ def parse_number(text: str) -> float:
     if not math.isfinite(value):
         raise ValueError(f"{shorten(text)!r} is no number: write 0.25, 1e-3, 1/4 or 25 %")
     return value
+
+
+def plain_text(text: str) -> str:
+    """Rows of numbers without byte order mark and comments (# or, as in MATLAB and LaTeX, a % that
+    follows no number, or that a letter follows), and with per cent signs beside their numbers."""
+    text = "\n".join(text.replace("\ufeff", "").splitlines())
+    text = re.sub(r"#.*", "", text)
+    text = re.sub(r"(?m)(?:^|(?<=[^\w.\s]))[ \t]*%.*|%[ \t]*[^\W\d].*", "", text)
+    return re.sub(r"[ \t]+%", "%", text)
 
 
 def shorten(text: str) -> str:

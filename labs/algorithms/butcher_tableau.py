@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from labs.errors import LabError
-from labs.number_texts import parse_number
+from labs.number_texts import parse_number, plain_text
 
 MOST_STAGES = 7
 LARGEST_COEFFICIENT = 100.0
@@ -53,8 +53,8 @@ def parse_tableau(text: str, pick: int = 0) -> Tableau:
     """A tableau as it is typed: one row a line (or after a semicolon), "c | a_i1 a_i2 ...", the
     last one "| b_1 b_2 ...". Numbers are decimals or fractions, between blanks or commas; zeros at
     a row's end may be left out. An embedded pair has two rows of weights: number `pick`, 0 or 1,
-    is taken. LaTeX goes, too, with & between the cells. Raises LabError, its message a sentence
-    that names the row."""
+    is taken. LaTeX goes, too, with & between the cells, and what a spreadsheet saves, with c in the
+    first column. Raises LabError, its message a sentence that names the row."""
     lines = _lines(text)
     weights = 1
     while weights < len(lines) and lines[-weights - 1].startswith("|"):
@@ -98,11 +98,10 @@ def _weights(line: str, q: int, name: str) -> np.ndarray:
 
 def _lines(text: str) -> list[str]:
     """The rows, each with one bar, without what is only for the eye."""
-    text = re.sub(
-        r"\\[dt]?frac\s*\{([^{}]*)\}\s*\{([^{}]*)\}", r"\1/\2", text.replace("\ufeff", "")
-    )
+    text = plain_text(text).replace("│", "|")
+    text = re.sub(r"\\[dt]?frac\s*\{([^{}]*)\}\s*\{([^{}]*)\}", r"\1/\2", text)
     text = re.sub(r"\\(hline|begin\{[^}]*\}(\{[^}]*\})?|end\{[^}]*\})|\$", " ", text)
-    text = re.sub(r"\\\\|;", "\n", text).replace("│", "|")
+    text = re.sub(r"\\\\|;", "\n", _from_spreadsheet(text))
     separated = re.search(r",\s|\d\.\d|\d/\d", text)
     text = text.replace(",", " " if separated else ".")
     lines = [line.strip() for line in text.splitlines() if re.search(r"[^\s|+_=─-]", line)]
@@ -110,6 +109,26 @@ def _lines(text: str) -> list[str]:
         (line if "|" in line else line.replace("&", "|", 1)).replace("&", " ").strip()
         for line in lines
     ]
+
+
+def _from_spreadsheet(text: str) -> str:
+    """Rows with bars where it is CSV: c, then the a, between tabs, semicolons or commas."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    mark = ""
+    if lines and (said := re.match(r"\W*sep=(.)", lines[0], re.IGNORECASE)):
+        mark = said[1]
+        lines.pop(0)
+    body = "\n".join(lines)
+    mark = mark or next((mark for mark in "\t;," if mark in body), "")
+    if "|" in body or "&" in body or not mark or len(lines) < 2:
+        return body
+    rows = []
+    for line in lines:
+        c, *a = (cell.strip(' \t"').replace(",", ".") for cell in line.split(mark))
+        while a and not a[-1]:
+            a.pop()
+        rows.append(f"{c} | {' '.join(cell or '0' for cell in a)}")
+    return "\n".join(rows)
 
 
 def _row(line: str, name: str, q: int) -> tuple[list[float], list[float]]:

@@ -67,12 +67,12 @@ class LqrProblem:
                 check_shape(name, given, shape, 0 if "final" in name else self.horizon)
         terms = self.terms
         check_weight("R", terms["r"], definite=True)
-        check_weight("Q_f", terms["q_final"])
         if self.s is None:
             check_weight("Q", terms["q"])
         else:
             q, s, r = terms["q"], terms["s"], terms["r"]
             check_weight("[Q S; S' R]", _blocks([[q, s], [s.transpose(0, 2, 1), r]]))
+        check_weight("Q_f", terms["q_final"])
 
     @property
     def n(self) -> int:

@@ -4,7 +4,7 @@ import pytest
 
 from labs.algorithms.butcher_tableau import parse_tableau
 from labs.errors import LabError
-from labs.number_texts import LONGEST_NUMBER, parse_number
+from labs.number_texts import LONGEST_NUMBER, parse_number, plain_text
 from labs.reinforcement_learning.markov.chains import parse_rows
 from labs.tasks.mdp_table.table import parse_table
 
@@ -37,6 +37,19 @@ def test_what_is_no_number_is_refused_at_once_and_shown_in_short(text: str) -> N
     with pytest.raises(ValueError, match="is no number: write") as refused:
         parse_number(text)
     assert len(str(refused.value)) < 100
+
+
+@pytest.mark.parametrize(
+    ("text", "plain"),
+    [
+        ("50 % | 50 \t%", "50% | 50%"),
+        ("% plant\n1 0\n# rest\n2", "\n1 0\n\n2"),
+        ("1 0; % 2 states\n10 %cheap\n5 %, 6 %;", "1 0;\n10 \n5%, 6%;"),
+        ("\ufeff1 # one\r\n2\r3", "1 \n2\n3"),
+    ],
+)
+def test_comments_are_left_out_and_per_cent_signs_kept(text: str, plain: str) -> None:
+    assert plain_text(text) == plain
 
 
 @pytest.mark.parametrize("number", ENDLESS)

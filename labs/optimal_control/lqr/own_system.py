@@ -21,7 +21,7 @@ import numpy as np
 from labs.algorithms.discretisation import zero_order_hold
 from labs.errors import LabError
 from labs.models.plant import Force
-from labs.number_texts import parse_number, shorten
+from labs.number_texts import parse_number, plain_text, shorten
 from labs.problems.linear_quadratic import LqrProblem
 
 NAMES = ("A", "B", "Q", "R", "x0")
@@ -151,27 +151,28 @@ def _json_rows(name: str, entry: Any) -> list[list[str]]:
 
 
 def _read_assignments(text: str) -> dict[str, np.ndarray]:
-    parts = re.split(r"(?:^|[\n;,])\s*([A-Za-z]\w*)\s*[=:]", _plain(text))
+    text = re.sub(r",\s*dtype\s*=\s*[\w.]+", "", plain_text(text))
+    parts = re.split(r"(?:^|[\n;,])\s*([A-Za-z]\w*)\s*[=:]", text)
     if parts[0].strip() or len(parts) < 2:
         raise LabError(
             f"{shorten(parts[0].strip())!r}: each matrix begins with its name, A = 1 0.1; 0 1"
         )
     said: dict[str, np.ndarray] = {}
     for name, entry in zip(parts[1::2], parts[2::2], strict=True):
-        said[_name(name)] = _matrix(name, *_text_rows(entry))
+        said[_name(name)] = _matrix(name, *_text_rows(name, entry))
     return said
 
 
-def _plain(text: str) -> str:
-    """Without what is only for machines, and per cent signs beside their numbers."""
-    return re.sub(r"[ \t]+%", "%", text.replace("\ufeff", "").replace("\r", ""))
-
-
-def _text_rows(entry: str) -> tuple[list[list[str]], bool]:
+def _text_rows(name: str, entry: str) -> tuple[list[list[str]], bool]:
     """The numbers row by row, and whether they are a diagonal."""
     entry = re.sub(r"\b(?:np|numpy)\.|\b(?:array|matrix|mat)\b", "", entry)
     diagonal = "diag" in entry
     entry = re.sub(r"\b(?:block_)?diag\b", "", entry)
+    if call := re.search(r"[^\W\d]\w*\s*\(", entry):
+        raise LabError(
+            f"{name}: {shorten(call[0])}...) is not worked out: write the numbers row by row, or "
+            "diag(1, 2); a single number of Q or R stands for so many times the unit matrix"
+        )
     entry = re.sub(r"\]\s*,?\s*\[", ";", entry)
     rows = re.sub(r"[\[\](){}]", " ", entry)
     split = [re.split(r"[,\s]+", row.strip(" ,\t")) for row in re.split(r"[;\n]", rows)]

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from labs.errors import LabError
-from labs.number_texts import parse_number
+from labs.number_texts import parse_number, plain_text
 from labs.tasks.mdp_table.table import Table, parse_table
 
 STUDENT = """state,    cost, Lecture, Exercise, Code, Café, Phone, Sleep
@@ -91,7 +91,7 @@ def parse_rows(text: str) -> dict[int, np.ndarray]:
     """Rows to put in the place of a chain's own, "2: 0 0.5 0.5" a line, by the number of the
     state from 0; weights are scaled to sum to 1. Raises LabError."""
     rows: dict[int, np.ndarray] = {}
-    for line in filter(str.strip, text.splitlines()):
+    for line in filter(str.strip, plain_text(text).splitlines()):
         number, colon, entries = line.partition(":")
         try:
             x, weights = int(number) - 1, np.array(list(map(parse_number, entries.split())))

@@ -275,6 +275,25 @@ def test_pairs_of_books_have_their_orders(name: str, pick: int, exact: np.ndarra
     assert np.log2(coarse / fine) == pytest.approx(orders[pick], abs=0.5)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0 |\n50 % | 50 %\n| 0 100 %",
+        "sep=;\n0;;\n0,5;0,5;\n;0;1",
+        "\ufeff0;;\r\n1/2;1/2;\r\n;;1;\r\n",
+        "0,,\n0.5,0.5,\n,0,1",
+        '"0"\t\n"50 %"\t"1/2"\n\t0\t1',
+        "sep=;\n0 |\n1/2 | 1/2\n| 0 1",
+        "% midpoint\n0 & \\\\ % first\n1/2 & 1/2 \\\\\n& 0 & 1 # weights",
+    ],
+    ids=["per cent", "sep", "excel", "commas", "tabs", "sep and bars", "comments"],
+)
+def test_spreadsheets_and_comments_are_read(text: str) -> None:
+    tableau = parse_tableau(text)
+    np.testing.assert_array_equal(tableau.a, MIDPOINT.a)
+    np.testing.assert_array_equal(tableau.b, MIDPOINT.b)
+
+
 def test_decimals_of_nine_digits_are_near_enough() -> None:
     rows = "0 |\n0.333333333 | 0.3333333337\n0.6666666667 | 0 0.666666667\n| 1/4 0 3/4"
     assert order(parse_tableau(rows)) == 3

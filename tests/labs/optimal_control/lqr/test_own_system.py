@@ -24,9 +24,13 @@ A, B, Q = [[1.0, 0.1], [0.0, 1.0]], [[0.005], [0.1]], [[10.0, 0.0], [0.0, 1.0]]
         "A = np.array([[1, 0.1],\n [0, 1]])\nB = np.array([[0.005], [0.1]])\n"
         "Q = np.diag([10, 1])\nR = [[1/10]]\nx_0: 1, 0",
         "A:\n1 0.1\n0 1\nB:\n0.005\n0.1\nQ: 10 1\nR: 10 %\nx0:\n1\n0",
+        "% plant\nA = [1 0.1; 0 1]; % 2 states\n# input\nB = [0.005; 0.1] # one\n"
+        "Q = diag(10, 1) % weights\nR = 10 %\nx0 = 1 0",
+        "A = np.array([[1, 0.1], [0, 1]], dtype=float)\nB = np.array([[0.005], [0.1]])\n"
+        "Q = np.diag([10, 1])\nR = 0.1\nx0 = 1, 0",
         json.dumps({"A": A, "B": [0.005, 0.1], "Q": Q, "R": 0.1, "x0": [1, 0]}),
     ],
-    ids=["example", "windows", "matlab", "numpy", "lines", "json"],
+    ids=["example", "windows", "matlab", "numpy", "lines", "comments", "dtype", "json"],
 )
 def test_ways_to_write_it(text: str) -> None:
     system = own_system(text)
@@ -48,6 +52,10 @@ def test_ways_to_write_it(text: str) -> None:
         (EXAMPLE.replace("0.005; 0.1", "1; 2; 3"), "B is 3 x 1: it has 2 rows"),
         (EXAMPLE.replace("diag(10, 1)", "diag(1, 2, 3)"), "Q is 3 x 3: it is 2 x 2, for A"),
         (EXAMPLE.replace("diag(10, 1)", "1 2; 0 1"), "Q"),
+        (EXAMPLE.replace("diag(10, 1)", "1 0; 0 -1"), "Q has an eigenvalue -1: it takes a"),
+        (EXAMPLE.replace("diag(10, 1)", "1 2; 0 1"), "Q is not symmetric"),
+        (EXAMPLE.replace("diag(10, 1)", "np.eye(2)"), "Q: eye(...) is not worked out: write the"),
+        (EXAMPLE.replace("R = 0.1", "R = 0.1*ones(1, 1)"), "R: ones(...) is not worked out"),
         (EXAMPLE.replace("R = 0.1", "R = 0"), "R"),
         (EXAMPLE.replace("x0 = 1 0", "x0 = 1"), "x0 has 1 numbers: A wants 2"),
         (EXAMPLE.replace("R = 0.1", "R = much"), "R: 'much' is no number"),

@@ -71,6 +71,19 @@ def convergence_message(mdp: FiniteMDP, V: np.ndarray, change: float, tolerance:
     return f"No value changed by more than {float(tolerance)}: the limit is within {round_up(far)}."
 
 
+def unbounded_message(V: np.ndarray, why: str = "") -> str:
+    """A sentence, but for its capital, on states whose cost-to-go V (X,) is not finite; empty if
+    there are none."""
+    many = int((~np.isfinite(V)).sum())
+    if not many:
+        return ""
+    where = f" {why}" if why else ""
+    return (
+        f"with gamma = 1 the cost-to-go of {many} of {len(V)} states grows without bound{where}. "
+        "Take a smaller gamma, or open a way to the goal."
+    )
+
+
 def error_bound(gamma: float, change: float, rounding: float = 0.0) -> float:
     """How far the values can be from the fixed point after a sweep that changed them by
     `change` and was exact to `rounding`, in the max norm; infinite for gamma = 1."""

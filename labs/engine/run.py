@@ -221,7 +221,8 @@ class World:
             raise LabError("the solver has found nothing yet that could be saved")
         solution = Solution.of(self.entry.slug, self.params.model_dump(), self.seed, self.shown)
         shown = (self.params, self.state)
-        return replace(solution, results={**self.lab.fields(*shown), **self.lab.results(*shown)})
+        plotted = {name: a for name, a in self.lab.fields(*shown).items() if np.size(a)}
+        return replace(solution, results={**plotted, **self.lab.results(*shown)})
 
     def _accept(self, snapshot: Snapshot) -> None:
         self.state = self.lab.accept(self.params, self.state, snapshot)

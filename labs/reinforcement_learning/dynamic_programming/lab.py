@@ -226,6 +226,17 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
             **table_sizes(int(params.joints), int(params.cuts)),
         }
 
+    def results(
+        self, params: DynamicProgrammingParams, state: DynamicProgrammingState
+    ) -> Mapping[str, np.ndarray]:
+        """Of the four methods V, NaN where one is not begun, and the number of the control that its
+        policy takes, -1 where it takes all alike: (4, X); of a table the names."""
+        at, place = state.iterates, state.tabular_task.place
+        V = np.where(at.started[:, None], at.V, np.nan)
+        if isinstance(place, TableWorld):
+            return place.results(V, at.policy)
+        return {"V": V, "greedy_control": at.policy}
+
     def notes(
         self, params: DynamicProgrammingParams, state: DynamicProgrammingState
     ) -> Mapping[str, str]:

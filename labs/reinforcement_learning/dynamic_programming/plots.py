@@ -63,8 +63,8 @@ PLOTS: tuple[Plot, ...] = (
     ),
     TimeSeries("Pendulum from upright", "rad", Line("angle", r"q - q^*"), when=PENDULUM),
     TimeSeries("Torque of the pendulum", "N·m", Line("torque", r"u"), when=PENDULUM),
-    HeatMap("Cost-to-go", "x", "y", "V", *AXES, "V", gaps=True, when=MAPPED),
-    HeatMap("Policy", "x", "y", "V", *AXES, "V", gaps=True, arrows="policy", when=MAPPED),
+    HeatMap("Cost-to-go", "x", "y", "V_map", *AXES, "V", gaps=True, when=MAPPED),
+    HeatMap("Policy", "x", "y", "V_map", *AXES, "V", gaps=True, arrows="policy", when=MAPPED),
     Bars("Cost-to-go by state", "state_V", "V", "", gaps=True, names="state_names", when=TABLE),
     Note("Policy by state", "by_state", when=TABLE),
     Curves(
@@ -117,7 +117,7 @@ def table_maps(
         values = V.reshape(place.shape)[::every, ::every].T
         if policy is not None and policy.ndim == 1:
             arrows = torque_arrows(place, policy, everywhere)
-    return {"x": x, "y": y, "V": values, "policy": arrows, "state_V": state_values(place, V)}
+    return {"x": x, "y": y, "V_map": values, "policy": arrows, "state_V": state_values(place, V)}
 
 
 def table_sizes(joints: int, nodes: int) -> dict[str, np.ndarray]:

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labs.algorithms import policy_evaluation, policy_iteration, value_iteration
-from labs.algorithms.bellman import NO_BOUND, Sweep
+from labs.algorithms.bellman import NO_BOUND, Sweep, unbounded_message
 from labs.problems.finite_mdp import FiniteMDP, random_policy
 from labs.rounding import round_up
 
@@ -107,10 +107,10 @@ def initial_iterates(
 ) -> Iterates:
     """Before the first sweep. V (4, X); policy (4, X), of which the first two are followed to
     begin with; limits (4, X), infinite where there is none: such an iteration does not begin."""
-    done = tuple(_without_limit(mdp, limit) for limit in limits)
+    done = tuple(_without_limit(limit) for limit in limits)
     if not done[1] and mdp.gamma == 1.0:
         first = policy_evaluation.exact(mdp, unpack_policy(mdp, policy[1]))
-        done = (done[0], _without_limit(mdp, first, "under the policy it starts from"), *done[2:])
+        done = (done[0], _without_limit(first, "under the policy it starts from"), *done[2:])
     fresh = np.zeros((1, 4), np.int64)
     errors = _distances(V, limits)[None]
     return Iterates(V, policy, fresh[0], np.array([0, 1, 0, 0]), errors, fresh, done)
@@ -219,15 +219,9 @@ def _distances(V: np.ndarray, limits: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(found), found, 0.0)
 
 
-def _without_limit(mdp: FiniteMDP, limit: np.ndarray, why: str = "") -> str:
-    many = int((~np.isfinite(limit)).sum())
-    if not many:
-        return ""
-    where = f" {why}" if why else ""
-    return (
-        f"{NOT_BEGUN}: with gamma = 1 the cost-to-go of {many} of {mdp.X} states grows without "
-        f"bound{where}. Take a smaller gamma, or open a way to the goal."
-    )
+def _without_limit(limit: np.ndarray, why: str = "") -> str:
+    message = unbounded_message(limit, why)
+    return f"{NOT_BEGUN}: {message}" if message else ""
 
 
 def convergence_curves(at: Iterates, gamma: float, most: int) -> dict[str, np.ndarray]:

@@ -136,7 +136,7 @@ class TdControl(Lab[TdParams, TdState]):
             if not training["sound"]:
                 done = "The estimates diverged."
             elif left == episodes:
-                done = f"{episodes_done(training)} episodes learned."
+                done = f"{episodes_done(training)} episodes learned. {task.without_optimum}".strip()
             yield Snapshot(i, training, done, 1.0 - (left - episodes) / wanted)
 
     def accept(self, params: TdParams, state: TdState, snapshot: Snapshot) -> TdState:
@@ -173,19 +173,23 @@ class TdControl(Lab[TdParams, TdState]):
         return shown | learning_curves(task, training)
 
     def results(self, params: TdParams, state: TdState) -> Mapping[str, np.ndarray]:
-        """Of every learner V and the number of the greedy control: (methods, learners, cells)."""
-        q = state.training["q"]
-        return {"V": q.min(axis=-1), "greedy_control": q.argmin(axis=-1)}
+        """Of every learner V and the number of the greedy control: (methods, learners, cells); of a
+        table the names."""
+        q, place = state.training["q"], params.task.place
+        V, control = q.min(axis=-1), q.argmin(axis=-1)
+        if isinstance(place, TableWorld):
+            return place.results(V, control)
+        return {"V": V, "greedy_control": control}
 
     def notes(self, params: TdParams, state: TdState) -> Mapping[str, str]:
         task, (m, s), by_state = params.task, params.view, UNNAMED
-        about = [task.mdp.report([task.start])]
+        about = [task.mdp.report([task.start]), task.without_optimum]
         if isinstance(task.place, CellWorld):
             about += task.place.notes
         if isinstance(task.place, TableWorld):
             q = _current(params, state)["q"][m, s]
             by_state = task.place.describe(q.min(axis=1), q.argmin(axis=1))
-        return {"about": "\n".join(about), "by_state": by_state}
+        return {"about": "\n".join(filter(None, about)), "by_state": by_state}
 
     def labels(self, params: TdParams) -> Mapping[str, str | tuple[str, ...]]:
         names = [LEARNING_METHODS[name] for name in params.methods]
@@ -198,6 +202,10 @@ class TdControl(Lab[TdParams, TdState]):
             "method": tuple(names),
             "first": names[0],
             "second": names[1] if len(names) > 1 else "",
+            "optimal": "" if params.task.without_optimum else "optimal",
+            "distance": "RMS, dashed: largest"
+            if params.task.compared.any()
+            else "no Q* with γ = 1",
             "across": "column" if grid else "angle from upright [rad]",
             "up": "row from below" if grid else "velocity [rad/s]",
         }

@@ -28,14 +28,14 @@ def _curves(title: str, y_label: str, mean: str, *edges: str) -> Curves:
         traces.append(Trace(f"episodes_{name}", f"{mean}_{name}", f"{{{name}}}", series=1 + i))
         traces += [Trace(f"episodes_{name}", f"{edge}_{name}", "", "dash", 1 + i) for edge in edges]
     if mean in ("online", "offline"):
-        traces.append(Trace("best_x", "best_y", "optimal", "dash"))
+        traces.append(Trace("best_x", "best_y", "{optimal}", "dash"))
     return Curves(title, "episodes", y_label, *tuple(traces), log_y=True)
 
 
 PLOTS: tuple[Plot, ...] = (
     _curves("Cost of an episode while learning", "J", "online", "online_low", "online_high"),
     _curves("Cost of the greedy policy, median", "J", "offline"),
-    _curves("Distance to Q*", "RMS; dashed: largest", "off", "most"),
+    _curves("Distance to Q*", "{distance}", "off", "most"),
     HeatMap("Q of the learner shown", "x", "y", "q", *AXES, "Q", gaps=True, when=MAPPED),
     HeatMap(
         "Greedy policy", "x", "y", "value", *AXES, "min Q", gaps=True, arrows="policy", when=MAPPED

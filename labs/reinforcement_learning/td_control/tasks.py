@@ -3,12 +3,12 @@ each with its exact answer from dynamic programming and a controller to look ove
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from labs.algorithms import policy_iteration
-from labs.algorithms.bellman import q_values
+from labs.algorithms.bellman import q_values, unbounded_message
 from labs.problems.episodes import EpisodicTask, episodic_task
 from labs.problems.finite_mdp import FiniteMDP, random_policy
 from labs.tasks.grid_world.cells import CellWorld
@@ -51,6 +51,13 @@ class LearningTask:
     def start(self) -> int:
         """Where a greedy policy is tried from."""
         return int(self.evaluation.starts[0])
+
+    @cached_property
+    def without_optimum(self) -> str:
+        """Why the start has no optimal cost, in a sentence; empty where it has one."""
+        V = self.q_star.min(axis=1)
+        message = "" if np.isfinite(V[self.start]) else unbounded_message(V)
+        return message[:1].upper() + message[1:]
 
     def on_map(self, values: np.ndarray, fill: float = 0.0) -> np.ndarray:
         """(rows, columns): `values` (X,) on the map, `fill` where there is no state."""

@@ -57,6 +57,17 @@ class TableWorld(CellWorld):
         """The table as an MDP."""
         return self.table.mdp(gamma)
 
+    def results(self, V: np.ndarray, control: np.ndarray) -> dict[str, np.ndarray]:
+        """For a solution: V and controls (..., X), -1 where all are alike, with the names of the
+        states (X,) and of what the controls count (U,)."""
+        own = self.table.has[np.arange(len(self.cells)), np.maximum(control, 0)]
+        return {
+            "V": V,
+            "greedy_control": np.where(control < 0, control, own),
+            "state_names": np.array(self.table.states),
+            "control_names": np.array(self.table.controls),
+        }
+
     def describe(self, V: np.ndarray, policy: np.ndarray | None) -> str:
         """V (X,) and the control of a policy (X,), if any, in words: a line a state."""
         lines = []
@@ -68,7 +79,8 @@ class TableWorld(CellWorld):
             else:
                 does = f": {self.table.control(x, int(policy[x]))}"
             value = f"{V[x]:.6g}".replace("-", "−")
-            lines.append(f"{name}{does}, V = {value}")
+            known = np.isfinite(V[x])
+            lines.append(f"{name}{does}, V = {value}" if known else f"{name}: no finite V")
         return "\n".join(lines)
 
 

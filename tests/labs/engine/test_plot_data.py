@@ -75,7 +75,7 @@ def test_several_curves_of_one_field_have_their_words() -> None:
 
 def test_heat_maps_have_their_cells_gaps_and_arrows(grid: World) -> None:
     fields = grid.lab.fields(grid.params, grid.state)
-    x, y, z = (np.asarray(fields[name]) for name in ("x", "y", "V"))
+    x, y, z = (np.asarray(fields[name]) for name in ("x", "y", "V_map"))
     for title in ("Cost-to-go", "Policy"):
         header, rows = table(grid, title)
         assert header[:3] == ["column", "row from below", "V"]
@@ -113,7 +113,7 @@ def test_json_has_all_with_what_it_belongs_to(grid: World) -> None:
     }
     policy = plots["Policy"]
     cells = np.array(policy["data"][policy["z"]], dtype=float)  # null is NaN
-    np.testing.assert_array_equal(cells, grid.lab.fields(grid.params, grid.state)["V"])
+    np.testing.assert_array_equal(cells, grid.lab.fields(grid.params, grid.state)["V_map"])
 
 
 def test_all_tables_in_one_file(oscillator: World) -> None:

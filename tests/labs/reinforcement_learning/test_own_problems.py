@@ -11,10 +11,13 @@ import numpy as np
 import pytest
 
 from labs.engine.headless import run
+from labs.engine.solution import Solution
 from labs.params import Value
 from labs.reinforcement_learning.dynamic_programming.lab import DynamicProgramming
 from labs.tasks.grid_world.map import GridWorld
 from labs.tasks.mdp_table.params import TAXICAB
+from labs.tasks.mdp_table.table import parse_table
+from labs.tasks.mdp_table.world import TableWorld
 from server.cli import main
 from tests.labs.tasks.published import LAKES, UTILITIES, frozen_lake, optimal_rewards
 from tests.labs.tasks.published import TAXICAB as PUBLISHED
@@ -106,3 +109,48 @@ def test_the_taxicab_is_learned() -> None:
     np.testing.assert_allclose(-V.mean(axis=0), list(PUBLISHED.values()), rtol=0.01)
     lines = world.lab.notes(world.params, world.state)["by_state"].splitlines()
     assert all(": stand" in line for line in lines)
+
+
+def test_solutions_have_values_controls_and_names() -> None:
+    """Of B, which has no radio, the control counts as what it does."""
+    for slug, settings in (
+        (SLUG, PRESETS["Taxicab"]),
+        ("td-control", {"system": "table", "gamma": 0.9, "anywhere": True, "episodes": 250.0}),
+    ):
+        world = run(slug, settings)
+        solution = world.solution()
+        results, place = solution.results, TableWorld(parse_table(TAXICAB))
+        assert results["state_names"].tolist() == ["A", "B", "C"]
+        assert results["control_names"].tolist() == ["cruise", "stand", "radio"]
+        control, V = results["greedy_control"], results["V"]
+        assert control.shape == V.shape == (*V.shape[:-1], 3)
+        assert set(control[..., 1].ravel()) <= {-1, 0, 1}
+        assert "policy" not in results, "a table has no arrows"
+        for form in ("json", "npz"):
+            assert Solution.read(solution.write(form)).results == {}
+        if slug == SLUG:
+            assert control.tolist() == [[-1, -1, -1], [1, 1, 1], [1, 1, 1], [1, 1, 1]]
+            np.testing.assert_allclose(-V[3], list(PUBLISHED.values()), atol=5e-3)
+    every = place.results(np.zeros(3), np.array([2, 2, 2]))["greedy_control"]
+    np.testing.assert_array_equal(every, [2, 0, 2])
+    grid = run(SLUG, PRESETS["4 x 3 world"]).solution().results
+    assert grid["V"].shape == grid["greedy_control"].shape == (4, 11)
+    assert grid["policy"].shape[1] == 4
+
+
+def test_costs_without_an_end_are_named_and_nothing_is_called_optimal() -> None:
+    said = "With gamma = 1 the cost-to-go of 3 of 3 states grows without bound. Take a smaller"
+    world = run("td-control", {"system": "table", "episodes": 250.0})
+    assert world.latest is not None
+    assert world.latest.done.startswith(f"250 episodes learned. {said}")
+    assert said in world.lab.notes(world.params, world.state)["about"]
+    labels = world.lab.labels(world.params)
+    assert (labels["optimal"], labels["distance"]) == ("", "no Q* with γ = 1")
+    planned = run(SLUG, {"world": "table", "gamma": 1.0})
+    assert planned.lab.notes(planned.params, planned.state)["by_state"] == "\n".join(
+        f"{town}: no finite V" for town in PUBLISHED
+    )
+    discounted = run("td-control", {"system": "table", "gamma": 0.9, "episodes": 250.0})
+    assert discounted.latest is not None
+    assert discounted.latest.done == "250 episodes learned."
+    assert discounted.lab.labels(discounted.params)["optimal"] == "optimal"

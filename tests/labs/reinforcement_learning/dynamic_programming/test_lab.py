@@ -113,7 +113,7 @@ def test_what_has_no_value_is_left_out(shown: str) -> None:
     assert not {"at_start", "promised", "error", "angle", "torque"} & set(measured)
     assert np.isnan(world.recording().channels["at_start"]).all()
     fields = world.lab.fields(world.params, world.state)
-    assert np.isnan(fields["V"]).all()
+    assert np.isnan(fields["V_map"]).all()
     for name in ("stationary", f"error_{shown}", f"backups_{shown}", "bound"):
         assert len(fields[name]) == 0, name
     scene = Drawn()
@@ -125,7 +125,7 @@ def test_cells_without_a_state_have_no_value_and_all_others_do() -> None:
     world = solved({"map": "S.#\n..G"})
     fields = world.lab.fields(world.params, world.state)
     wall = [[False, False, False], [False, False, True]]
-    np.testing.assert_array_equal(np.isnan(fields["V"]), wall)
+    np.testing.assert_array_equal(np.isnan(fields["V_map"]), wall)
     ways = {(x, y): (right, up) for x, y, right, up in fields["policy"].tolist()}
     assert ways.keys() == {(1, 2), (2, 2), (1, 1), (2, 1)}, "all but wall and goal; y = 2 on top"
     assert ways[1, 1] == ways[2, 1] == (1, 0)

@@ -40,7 +40,7 @@ class LqrParams(Params):
     """What is to be kept at rest."""
     time: str = SYSTEM.choice("discrete", TIMES, "A and B are in", when=OWN)
     """Continuous time is made discrete with the control held for a time step."""
-    matrices: str = SYSTEM.text(EXAMPLE, "Your matrices", rows=6, max_length=2000, when=OWN)
+    matrices: str = SYSTEM.text(EXAMPLE, "Your matrices", rows=6, max_length=6000, when=OWN)
     """A, B, Q, R and x0, each after its name, rows after one another with semicolons or on lines of
     their own; or as JSON; pasted or a file. Up to 8 states and 4 controls."""
     deviation: float = SYSTEM.knob(

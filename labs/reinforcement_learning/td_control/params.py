@@ -98,7 +98,8 @@ class TdParams(Params):
     )
     """What any step costs, beside what the cell costs that it leads to."""
     gamma: float = WORLD.knob(1.0, 0.0, 1.0, r"\gamma", "", "Discount", step=0.01)
-    """Of the next step's cost. The pendulum's task never ends: 0.99 at most there."""
+    """Of the next step's cost. The pendulum's task never ends: 0.99 at most there. A table without
+    an end needs less than 1, too."""
     effort: float = WORLD.knob(
         0.05,
         0.0,

@@ -13,7 +13,7 @@ The third minimises |J q' - v|^2 + lambda^2 |q'|^2; since sigma / (sigma^2 + lam
 1 / (2 lambda), so is |q'| / |v|. (Nakamura and Hanafusa 1986; Wampler 1986.)
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 import pinocchio as pin
@@ -23,6 +23,8 @@ from labs.algorithms.jacobian import ForwardKinematics, geometric_jacobian
 
 REACHED = 1e-3
 """[m] A place is within reach if the frame comes as near as this."""
+POSTURE_STEPS, POSTURE_DAMPING = 60, 0.05
+"""Of the search for the posture nearest to a place: steps, and the least damping [m/rad]."""
 RELATIVE_CUTOFF = 1e-12
 """Singular values below this share of the largest count as zero in the pseudo-inverse."""
 
@@ -118,3 +120,28 @@ def nearest_distance(
         if least <= REACHED:
             break
     return least
+
+
+def nearest_posture(
+    tip: Callable[[np.ndarray], np.ndarray],
+    jacobian: Callable[[np.ndarray], np.ndarray],
+    target: np.ndarray,
+    home: np.ndarray,
+) -> np.ndarray:
+    """q (n,) of revolute joints with tip(q) (3,) [m] at, or as near as found to, `target`, each
+    joint within half a turn of `home` (n,), from where it is sought. `jacobian(q)` is (3, n).
+
+    Damped least squares, with the damping of Levenberg and Marquardt: a step that leads away is
+    not taken, but damped more, so that a place out of reach leaves the arm stretched towards it.
+    """
+    q, damping = home, POSTURE_DAMPING
+    error = target - tip(q)
+    for _ in range(POSTURE_STEPS):
+        tried = q + damped_least_squares(jacobian(q), error, damping)
+        left = target - tip(tried)
+        if left @ left < error @ error:
+            q, error, damping = tried, left, max(0.5 * damping, POSTURE_DAMPING)
+        else:
+            damping *= 4.0
+    turn = q - home
+    return q - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))

@@ -8,7 +8,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from labs.algorithms.inverse_kinematics import damped_least_squares
+from labs.algorithms.inverse_kinematics import nearest_posture
 from labs.models.mechanisms import Mechanism, mechanism
 from labs.shapes import Vector3
 from labs.tasks.motion.continuous import CONTINUOUS_MOTIONS
@@ -31,8 +31,6 @@ CAMERAS: Mapping[str, tuple[Vector3, Vector3]] = {
     "ur5": CONTINUOUS_MOTIONS["ur5"].camera,
 }
 """By motion: where a viewer stands and what it looks at [m], so that time is seen to run back."""
-REACH_STEPS, REACH_DAMPING = 60, 0.05
-"""Of inverse kinematics, for a posture with the tip at a target."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,8 +95,5 @@ def reaching_posture(name: str, target: np.ndarray) -> np.ndarray:
 @lru_cache(maxsize=8)
 def _reaching(name: str, target: tuple[float, ...]) -> tuple[float, ...]:
     body = system(name).mechanism
-    q = body.arm.home
-    for _ in range(REACH_STEPS):
-        error = np.array(target) - body.tip(q)
-        q = q + damped_least_squares(body.tip_jacobian(q), error, REACH_DAMPING)
+    q = nearest_posture(body.tip, body.tip_jacobian, np.array(target), body.arm.home)
     return tuple(q.tolist())

@@ -12,7 +12,7 @@ from labs.tasks.direct.history import ARC_POINTS, KEPT, History
 from labs.tasks.direct.params import GUESSES, DirectParams
 from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots, joined
 from labs.tasks.direct.player import DirectState, advanced, dragged, measured, replayed
-from labs.tasks.direct.systems import TITLES
+from labs.tasks.direct.systems import TITLES, reaching_posture, system
 from labs.tasks.direct.tracking import playable
 from labs.tasks.direct.trajectory import Trajectory
 from labs.tasks.motion.playback import FEEDBACK, OPEN_LOOP, start_playback
@@ -54,6 +54,54 @@ def test_a_first_guess_starts_at_the_start(system: str, guess: str) -> None:
     if guess == "line":
         tip = params.task.mechanism.tip(X[-1, : nx // 2])
         np.testing.assert_allclose(tip, params.goal_place, atol=1e-3)
+
+
+SHOULDER, LINKS, WRIST, TOOL, ASIDE = 0.089159, 0.425 + 0.39225, 0.09465, 0.0823, 0.10915
+"""[m] of the UR5: its height, upper arm and forearm, the wrist's two parts, and how far the plane
+they move in lies beside the axis of the base."""
+
+
+def distance_of_what_it_reaches(target: np.ndarray) -> float:
+    """[m] from a place (3,) outside of all that the UR5 reaches, by its geometry: stretched out at
+    any elevation, its tool turned out of the arm's plane by any angle."""
+    elevation, turn = np.meshgrid(np.linspace(-np.pi, np.pi, 2001), np.linspace(-np.pi, np.pi, 401))
+    stretched = LINKS + np.hypot(WRIST, TOOL * np.cos(turn))
+    beside = np.hypot(stretched * np.cos(elevation), ASIDE + TOOL * np.sin(turn))
+    above = SHOULDER + stretched * np.sin(elevation)
+    return float(np.hypot(np.hypot(*target[:2]) - beside, target[2] - above).min())
+
+
+@pytest.mark.parametrize(
+    "target",
+    [(0.9, 0.9, 1.0), (-0.9, -0.9, 0.05), (-0.87, 0.56, 0.92), (0.7, -0.7, 0.6), (0.7, -0.5, 0.64)],
+)
+def test_a_place_out_of_reach_is_come_as_near_to_as_the_arm_can(
+    target: tuple[float, float, float],
+) -> None:
+    place, at = np.array(target), system("ur5").mechanism
+    q = reaching_posture("ur5", place)
+    least = distance_of_what_it_reaches(place)
+    assert least > 0.05
+    assert np.linalg.norm(at.tip(q) - place) == pytest.approx(least, abs=1e-4)
+    assert np.abs(q - at.arm.home).max() <= np.pi
+
+
+def test_so_is_the_axis_of_the_base() -> None:
+    """No nearer than the tool can lead back across the distance by which the arm lies aside."""
+    place, at = np.array([0.0, 0.0, 0.3]), system("ur5").mechanism
+    tip = at.tip(reaching_posture("ur5", place))
+    assert np.linalg.norm(tip - place) == pytest.approx(ASIDE - TOOL, abs=1e-4)
+
+
+def test_of_places_within_reach_none_is_missed() -> None:
+    """All around the base, behind it too, and each joint within half a turn of home."""
+    at, rng = system("ur5").mechanism, np.random.default_rng(0)
+    for _ in range(200):
+        q = at.arm.home + rng.uniform(-3.0, 3.0, 6)
+        place = at.tip(q)
+        found = reaching_posture("ur5", place)
+        np.testing.assert_allclose(at.tip(found), place, atol=1e-3)
+        assert np.abs(found - at.arm.home).max() <= np.pi
 
 
 def test_a_path_is_parted_where_it_has_gaps() -> None:

@@ -40,9 +40,8 @@ def test_a_plan_without_active_limits_is_lqr() -> None:
         found = plan(LinearPlanner(problem, form), x)
         assert found.found
         assert not any(rows.any() for rows in found.active.values())
-        close = 1e-9 if form == "condensed" else 1e-8
-        np.testing.assert_allclose(found.U, found.X[:-1] @ K.T, atol=close)
-        assert found.cost == pytest.approx(x @ P @ x / 2, abs=close)
+        np.testing.assert_allclose(found.U, found.X[:-1] @ K.T, rtol=0.0, atol=1e-9)
+        assert found.cost == pytest.approx(x @ P @ x / 2, rel=0.0, abs=1e-9)
 
 
 def test_plans_are_those_of_a_second_solver_and_optimal() -> None:

@@ -20,6 +20,7 @@ from labs.optimal_control.mpc.plots import (
     PHASES,
     PLOTS,
     TIMED,
+    horizon_note,
     limit_fields,
     prediction_fields,
     time_fields,
@@ -223,8 +224,12 @@ class Mpc(Lab[MpcParams, MpcState]):
         )
 
     def notes(self, params: MpcParams, state: MpcState) -> Mapping[str, str]:
-        status = state.controller.status
-        return {"said": f"{status or 'Plans are found.'}\n{time_note(state.seconds, params.h)}"}
+        said = [
+            state.controller.status or "Plans are found.",
+            time_note(state.seconds, params.h),
+            horizon_note(params),
+        ]
+        return {"said": "\n".join(filter(None, said))}
 
     def labels(self, params: MpcParams) -> Mapping[str, str | tuple[str, ...]]:
         words = coordinate_labels(params.robot.mechanism)

@@ -41,7 +41,8 @@ class MpcParams(Params):
     """What the user can turn."""
 
     system: str = TASK.choice("ur5", TITLES, "Robot", key=True)
-    """What is controlled. The pendulums hang at first."""
+    """What is controlled. The pendulums hang at first; to swing up the cart's pole plans must look
+    0.6 s ahead: take a period of 20 ms."""
     mode: str = TASK.choice("both", MODES, "Controller", effect="live", key=True)
     """Planning and acting, each alone or both at every period."""
 

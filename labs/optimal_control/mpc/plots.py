@@ -13,6 +13,8 @@ PHASES = ("derivatives", "QP", "rest")
 """Of a plan, that are timed."""
 TIMED = 200
 """Plans whose durations are kept."""
+SWING_UP = 0.6
+"""[s] about so far a plan must look ahead to swing up the pole of a cart."""
 
 PLOTS: tuple[Plot, ...] = (
     Curves(
@@ -125,4 +127,15 @@ def time_note(seconds: Mapping[str, float | np.ndarray], h: float) -> str:
     return (
         f"A plan takes {1e3 * median:.2f} ms ({parts}), {100 * median / h:.0f} % of the period. "
         f"Of the last {len(total)}, {late} missed the deadline."
+    )
+
+
+def horizon_note(params: MpcParams) -> str:
+    """Whether plans look too short a time ahead for what they are to do; empty if not."""
+    ahead = params.N * params.h
+    if params.system != "cart-pole" or ahead > SWING_UP - 0.5 * params.h:
+        return ""
+    return (
+        f"Plans look {ahead:.2f} s ahead, too short a time to swing up the pole: give them "
+        f"{SWING_UP} s or more, by a period of 20 ms or by more steps."
     )

@@ -26,6 +26,20 @@ def test_the_goal_has_the_tip_at_the_ball(name: str, target: list[float]) -> Non
     np.testing.assert_allclose(system(name).mechanism.tip(q), target, atol=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("target", "off"), [((0.9, 0.9, 1.0), 0.6152), ((-0.9, -0.9, 0.05), 0.3235)]
+)
+def test_a_target_out_of_reach_is_approached_and_the_arm_rests(
+    target: tuple[float, float, float], off: float
+) -> None:
+    """As near as its posture and the limits of the joints let it come."""
+    names = ("target_x", "target_y", "target_z")
+    found = ran(dict(zip(names, target, strict=True)), 3.0)
+    assert off - 1e-3 < found.last("miss") < off + 0.02
+    assert np.abs(found.state.x[6:]).max() < 0.02
+    assert found.last("failures") == 0
+
+
 def test_the_goal_is_where_nothing_costs() -> None:
     params = MpcParams()
     at = problem(params, params.target)
@@ -122,3 +136,15 @@ def test_what_runs_away_is_said() -> None:
     wild.base = wild.base + np.array([0.0, 0.0, 500.0, 0.0])
     after = found.world.lab.step(found.params, Inputs(), wild)
     assert after.trouble.startswith("The robot went out of control at t = ")
+
+
+def test_a_horizon_too_short_to_swing_up_the_pole_is_said() -> None:
+    """As the menu leaves it; a period of 20 ms is enough."""
+    swung = {}
+    for h in (0.01, 0.02):
+        found = ran({"system": "cart-pole", "h": h}, 4.0)
+        said = found.world.lab.notes(found.params, found.state)["said"]
+        assert ("Plans look 0.30 s ahead, too short" in said) == (h == 0.01)
+        swung[h] = found.last("miss")
+    assert swung[0.01] > 1.0
+    assert swung[0.02] < 0.01

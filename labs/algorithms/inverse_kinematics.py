@@ -143,5 +143,5 @@ def nearest_posture(
             q, error, damping = tried, left, max(0.5 * damping, POSTURE_DAMPING)
         else:
             damping *= 4.0
-    turn = q - home
-    return q - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
+    turns = np.round((q - home) / (2.0 * np.pi))
+    return np.asarray(q - 2.0 * np.pi * turns)

@@ -1,5 +1,7 @@
 """Collocation: derivatives, measured orders, closed forms, and Ipopt on the same discretisation."""
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -18,14 +20,15 @@ from labs.tasks.motion.motions import MotionWeights
 from labs.tasks.motion.tip_constraints import Ball
 from tests.labs.algorithms.collocation_oracle import ipopt
 from tests.labs.algorithms.transcriptions import (
+    REACH_TARGET,
     check_derivatives,
+    limited_reach,
     minimum_energy,
     minimum_time,
     regulated_mass,
     straight,
 )
 
-TARGET = np.array([0.4, -0.35, 0.25])
 BALL = Ball(np.array([0.35, -0.1, 0.4]), 0.1)
 
 
@@ -39,7 +42,7 @@ def everything(name: str) -> ContinuousProblem:
     limits = MotionLimits(velocity=4.0, control=0.8, obstacles=(BALL,))
     if name == "ur5":
         return continuous_motion(
-            "ur5", "least-energy", 1.0, limits=limits, target=TARGET, T_limits=(0.5, 2.0)
+            "ur5", "least-energy", 1.0, limits=limits, target=REACH_TARGET, T_limits=(0.5, 2.0)
         )
     return continuous_motion(name, "least-time", 1.5, limits=limits, T_limits=(0.5, 3.0))
 
@@ -47,7 +50,8 @@ def everything(name: str) -> ContinuousProblem:
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("name", ["cart-pole", "ur5"])
 def test_derivatives_are_those_of_finite_differences(name: str, scheme: str) -> None:
-    for problem in (everything(name), continuous_motion(name, "weighted", 1.0, target=TARGET)):
+    weighted = continuous_motion(name, "weighted", 1.0, target=REACH_TARGET)
+    for problem in (everything(name), weighted):
         program = Collocation(problem, 3, scheme)
         y = np.random.default_rng(1).normal(size=program.n)
         y[-1] = 1.3 if program.free_time else y[-1]
@@ -161,29 +165,67 @@ def riccati_cost(problem: ContinuousProblem, steps: int = 4000) -> float:
     return float(dx @ P @ dx)
 
 
-LIMITED: dict[str, tuple[str, str, float, MotionLimits, tuple[float, float] | None]] = {
-    "pendulum": ("pendulum", "weighted", 2.0, MotionLimits((-0.3,), (3.2,), 5.0, 0.9), None),
-    "pendulum, energy": ("pendulum", "least-energy", 2.0, MotionLimits((), (), 5.0, 0.9), None),
-    "double pendulum": ("double-pendulum", "weighted", 2.0, MotionLimits((), (), 6.0, 0.7), None),
-    "cart-pole": ("cart-pole", "weighted", 2.0, MotionLimits((-0.3, -9.0), (0.3, 9.0), 6.0), None),
-    "cart-pole, time": (
-        "cart-pole",
-        "least-energy",
-        1.3,
-        MotionLimits((), (), 7.0, 1.0),
-        (0.5, 1.4),
+def reach(target: np.ndarray = REACH_TARGET, T: float = 1.0, **limits: Any) -> ContinuousProblem:
+    return continuous_motion("ur5", "least-energy", T, limits=MotionLimits(**limits), target=target)
+
+
+def hasty_reach() -> ContinuousProblem:
+    return reach(T=0.6, velocity=1.6, control=0.4, obstacles=(BALL,))
+
+
+def limited(
+    name: str, objective: str, T: float, *limits: Any, T_limits: tuple[float, float] | None = None
+) -> Callable[[], ContinuousProblem]:
+    at = MotionLimits(*limits)
+    return partial(continuous_motion, name, objective, T, limits=at, T_limits=T_limits)
+
+
+LIMITED: dict[str, tuple[str, Callable[[], ContinuousProblem]]] = {
+    "pendulum": ("vu", limited("pendulum", "weighted", 2.0, (-0.3,), (3.2,), 5.0, 0.9)),
+    "pendulum, energy": ("vu", limited("pendulum", "least-energy", 2.0, (), (), 5.0, 0.9)),
+    "pendulum, narrow": ("qu", limited("pendulum", "least-energy", 2.0, (-0.1,), (3.2,), 5.0, 0.7)),
+    "double pendulum": ("vu", limited("double-pendulum", "weighted", 2.0, (), (), 6.0, 0.7)),
+    "double pendulum, time": (
+        "qvu",
+        limited(
+            "double-pendulum", "least-time", 1.5, (-0.2, -1.0), (3.2, 1.0), 5.0, 0.8,
+            T_limits=(0.5, 3.0),
+        ),
     ),
-    "mass, time": ("mass", "least-time", 3.0, MotionLimits((), (), 0.8, 1.0), (0.5, 6.0)),
-}
+    "cart-pole": ("qv", limited("cart-pole", "weighted", 2.0, (-0.3, -9.0), (0.3, 9.0), 6.0)),
+    "cart-pole, time": (
+        "vuT",
+        limited("cart-pole", "least-energy", 1.3, (), (), 7.0, 1.0, T_limits=(0.5, 1.4)),
+    ),
+    "mass, time": ("vu", limited("mass", "least-time", 3.0, (), (), 0.8, 1.0, T_limits=(0.5, 6.0))),
+    "ur5": ("qvug", partial(limited_reach, 0.2)),
+    "ur5, hasty": ("v", hasty_reach),
+    "ur5, time": ("vu", partial(limited_reach, 0.2, "least-time", (0.4, 1.5))),
+}  # fmt: skip
+"""A problem, and of which kinds limits are active: of q, v and u, of the distance from an obstacle
+g, and of the final time T."""
+
+
+def active_kinds(program: Collocation, at: Iterate) -> str:
+    states, active = program.grid.states, at.active_bounds != 0.0
+    n = states.shape[1] // 2
+    kinds = {
+        "q": active[states[:, :n]],
+        "v": active[states[:, n:]],
+        "u": active[program.grid.controls],
+        "g": at.active_inequalities,
+        "T": active[-1:] if program.free_time else np.zeros(0),
+    }
+    return "".join(kind for kind, rows in kinds.items() if rows.any())
 
 
 @pytest.mark.parametrize("case", LIMITED)
 def test_costs_equal_ipopts_on_the_same_discretised_problem(case: str) -> None:
-    """With limits of q, v and u that are active, and with a free final time."""
-    name, objective, T, limits, T_limits = LIMITED[case]
-    problem = continuous_motion(name, objective, T, limits=limits, T_limits=T_limits)
-    N, guess = 40, straight(problem, 40)
-    program = Collocation(problem, N, "trapezoidal")
+    """With limits of q, v and u that are active, each of them in some case of the pendulums and in
+    one of the UR5, and with a final time that is free and not at its limits."""
+    kinds, made = LIMITED[case]
+    problem, N = made(), 12 if case.startswith("ur5") else 40
+    program, guess = Collocation(problem, N, "trapezoidal"), straight(problem, N)
     at = sqp.solve(program, program.variables(guess.X, guess.U))
     assert at.converged, at.stopped
     found, X, U = program.trajectory(at.y)
@@ -191,7 +233,7 @@ def test_costs_equal_ipopts_on_the_same_discretised_problem(case: str) -> None:
     assert wanted.success
     assert at.values.f == pytest.approx(wanted.cost, rel=1e-6)
     assert found == pytest.approx(wanted.T, rel=1e-5)
-    assert (at.active_bounds != 0.0).any()
+    assert active_kinds(program, at) == kinds
 
 
 @pytest.mark.parametrize("scheme", ["midpoint", "hermite-simpson"])
@@ -204,23 +246,6 @@ def test_so_do_those_of_the_other_rules(scheme: str) -> None:
     wanted = ipopt(problem, 20, scheme, X, U, warm=True)
     assert at.converged
     assert at.values.f == pytest.approx(wanted.cost, rel=1e-6)
-
-
-def reach(target: np.ndarray = TARGET, T: float = 1.0, **limits: Any) -> ContinuousProblem:
-    return continuous_motion("ur5", "least-energy", T, limits=MotionLimits(**limits), target=target)
-
-
-def test_so_does_that_of_the_ur5_around_an_obstacle_within_its_limits() -> None:
-    problem = reach(T=0.6, velocity=1.6, control=0.4, obstacles=(BALL,))
-    N, guess = 12, straight(problem, 12)
-    program = Collocation(problem, N, "trapezoidal")
-    at = sqp.solve(program, program.variables(guess.X, guess.U))
-    assert at.converged, at.stopped
-    _, X, U = program.trajectory(at.y)
-    wanted = ipopt(problem, N, "trapezoidal", X, U, warm=True)
-    assert wanted.success
-    assert at.values.f == pytest.approx(wanted.cost, rel=1e-6)
-    assert (at.active_bounds != 0.0).any()
 
 
 def test_what_cannot_be_reached_is_infeasible_and_says_why() -> None:

@@ -19,7 +19,9 @@ from labs.tasks.motion.continuous import MotionLimits, continuous_motion
 from labs.tasks.motion.tip_constraints import Ball
 from tests.labs.algorithms.collocation_oracle import ipopt
 from tests.labs.algorithms.transcriptions import (
+    REACH_TARGET,
     check_derivatives,
+    limited_reach,
     minimum_energy,
     minimum_time,
     regulated_mass,
@@ -59,9 +61,8 @@ def test_derivatives_are_those_of_finite_differences(name: str, method: str, seg
 
 def test_so_are_those_of_a_reach_around_a_ball() -> None:
     limits = MotionLimits(velocity=4.0, control=0.8, obstacles=(BALL,))
-    target = np.array([0.4, -0.35, 0.25])
     problem = continuous_motion(
-        "ur5", "least-energy", 1.0, limits=limits, target=target, T_limits=(0.5, 2.0)
+        "ur5", "least-energy", 1.0, limits=limits, target=REACH_TARGET, T_limits=(0.5, 2.0)
     )
     program = MultipleShooting(problem, 3, 2)
     z = 0.5 * np.random.default_rng(1).normal(size=program.n)
@@ -162,6 +163,22 @@ def test_costs_equal_ipopts_on_the_same_discretised_problem(case: str) -> None:
         assert at.values.f == pytest.approx(wanted.cost, rel=1e-6)
         assert program.horizon(at.y) == pytest.approx(wanted.T, rel=1e-5)
         assert (at.active_bounds != 0.0).any() or at.active_inequalities.any()
+
+
+def test_so_does_that_of_the_ur5_with_limits_of_every_kind_active() -> None:
+    problem = limited_reach(0.18)
+    program, at = solved(problem, 10, 10)
+    assert at.converged, at.stopped
+    arcs, U = program.arcs(at.y), program.controls(at.y)
+    wanted = ipopt(problem, 10, "rk4", np.concatenate([arcs.X, arcs.Y[-1:]]), U, warm=True)
+    assert wanted.success
+    assert at.values.f == pytest.approx(wanted.cost, rel=1e-6)
+    active = at.active_bounds != 0.0
+    assert active[program.segments.starts[:, 6:]].any(), "velocities"
+    assert active[program.segments.controls].any(), "controls"
+    named = [program.inequality_name(int(i)) for i in np.nonzero(at.active_inequalities)[0]]
+    assert any("the tip's distance from obstacle 1" in name for name in named)
+    assert any("bound of x_1 at the end" in name for name in named), "a position"
 
 
 @pytest.mark.parametrize("segments", [1, 4, 10])

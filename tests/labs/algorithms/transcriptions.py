@@ -6,13 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm, solve_discrete_are  # noqa: F401
 
+from labs.models.mechanisms import mechanism
 from labs.problems.continuous_control import ContinuousProblem
 from labs.problems.nonlinear_program import NonlinearProgram
 from labs.resumable import run_to_completion
 from labs.tasks.motion.continuous import MotionLimits, continuous_motion
 from labs.tasks.motion.continuous_cost import ContinuousMotionCost
+from labs.tasks.motion.tip_constraints import Ball
 
 EPSILON = 1e-6
+REACH_TARGET = np.array([0.4, -0.35, 0.25])
 
 
 def check_derivatives(program: NonlinearProgram, y: np.ndarray, seed: int = 0) -> None:
@@ -76,3 +79,21 @@ def minimum_time() -> ContinuousProblem:
     """The mass, 1 m from rest to rest with |u| <= 1 N: T = 2 s, switching at 1 s."""
     limits = MotionLimits(control=1.0)
     return continuous_motion("mass", "least-time", 3.0, limits=limits, T_limits=(0.5, 6.0))
+
+
+def limited_reach(
+    control: float, objective: str = "least-energy", T_limits: tuple[float, float] | None = None
+) -> ContinuousProblem:
+    """The UR5 within 0.85 rad of home and 1.8 rad/s, around a ball in the midst of its way."""
+    body = mechanism("ur5")
+    home, middle = body.arm.home, 0.5 * (body.tip(body.arm.home) + REACH_TARGET)
+    limits = MotionLimits(
+        tuple(home - 0.85),
+        tuple(home + 0.85),
+        1.8,
+        control,
+        (Ball(middle + np.array([0.03, 0.0, 0.0]), 0.06),),
+    )
+    return continuous_motion(
+        "ur5", objective, 0.7, limits=limits, target=REACH_TARGET, T_limits=T_limits
+    )

@@ -10,6 +10,7 @@ from scipy.optimize import linprog
 
 from labs.algorithms.polygons import (
     Unbounded,
+    from_vertices,
     support_of_points,
     vertices,
     with_unit_rows,
@@ -87,6 +88,16 @@ def without_redundant_rows(polyhedron: Polyhedron, tolerance: float = TOLERANCE)
     return Polyhedron(unit.H[kept], unit.h[kept])
 
 
+def _without_redundant_rows(polyhedron: Polyhedron) -> Polyhedron:
+    """Likewise, in the plane by its corners."""
+    if polyhedron.n == 2:
+        try:
+            return from_vertices(vertices(polyhedron))
+        except Unbounded:
+            pass
+    return without_redundant_rows(polyhedron)
+
+
 def project(polyhedron: Polyhedron, n: int) -> Polyhedron:
     """{x in R^n : (x, u) in the polyhedron for some u}, by Fourier-Motzkin elimination: of the last
     variable, each row that bounds it above joins each that bounds it below. Redundant rows go
@@ -96,10 +107,11 @@ def project(polyhedron: Polyhedron, n: int) -> Polyhedron:
         column = H[:, last]
         zero = np.abs(column) <= 1e-12 * np.abs(H).max(axis=1, initial=0.0)
         above, below = np.flatnonzero((column > 0.0) & ~zero), np.flatnonzero((column < 0) & ~zero)
-        pairs = [(i, j) for i in above for j in below]
-        rows = [H[zero]] + [(H[i] / column[i] - H[j] / column[j])[None] for i, j in pairs]
-        ends = [h[zero]] + [np.array([h[i] / column[i] - h[j] / column[j]]) for i, j in pairs]
-        left = Polyhedron(np.vstack(rows)[:, :last], np.concatenate(ends))
-        left = without_redundant_rows(left)
+        scale = np.where(zero, 1.0, column)
+        H, h = H / np.abs(scale)[:, None], h / np.abs(scale)
+        rows = (H[above][:, None] + H[below][None]).reshape(-1, last + 1)
+        ends = (h[above][:, None] + h[below][None]).ravel()
+        left = Polyhedron(np.vstack([H[zero], rows])[:, :last], np.concatenate([h[zero], ends]))
+        left = _without_redundant_rows(left)
         H, h = left.H, left.h
     return Polyhedron(H, h)

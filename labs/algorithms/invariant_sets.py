@@ -12,6 +12,7 @@ In the plane Pre(S) = {x in X : A x in S + (-B U - c)}, a sum of polygons; elsew
 U are unbounded, the shadow of a polyhedron of (x, u).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +25,7 @@ from labs.algorithms.polygons import (
     with_unit_rows,
 )
 from labs.algorithms.polytopes import is_empty, project, support
-from labs.problems.linear_mpc import LinearMpcProblem
+from labs.problems.linear_mpc import LinearMpcProblem, check_holds
 from labs.problems.polyhedron import Polyhedron
 
 TOLERANCE = 1e-9
@@ -80,15 +81,33 @@ def _interval(control_set: Polyhedron) -> np.ndarray:
     return np.array([[low], [high]])
 
 
-def feasible_sets(problem: LinearMpcProblem) -> list[Polyhedron]:
+def feasible_sets(
+    problem: LinearMpcProblem, holds: Sequence[int] | None = None
+) -> list[Polyhedron]:
     """X_0 ... X_N: from X_i the terminal set X_N = X_f is reached in N - i steps within X and U;
-    X_0 is where the problem is feasible. Without X_f, X_N is all of R^n."""
-    nowhere = Polyhedron(np.zeros((0, problem.n)), np.zeros(0))
+    X_0 is where the problem is feasible. Without X_f, X_N is all of R^n. With `holds`, which add up
+    to N, by controls held over holds[0], holds[1], ... steps. Raises LabError if they do not."""
+    n, m, k = problem.n, problem.m, problem.N
+    holds = [1] * k if holds is None else holds
+    check_holds(holds, k)
+    x_of, u_of = np.eye(n, n + m), np.eye(m, n + m, k=n)
+    ahead = np.vstack([np.hstack([problem.A, problem.B]), u_of])
+    drift = np.zeros(n + m) if problem.c is None else np.append(problem.c, np.zeros(m))
+    nowhere = Polyhedron(np.zeros((0, n)), np.zeros(0))
     sets = [nowhere if problem.terminal_set is None else problem.terminal_set]
-    for k in range(problem.N - 1, -1, -1):
-        X = _tightened(problem.state_set, problem.state_margins, k)
-        U = _tightened(problem.control_set, problem.control_margins, k)
-        sets.insert(0, backward_reachable(problem.A, problem.B, X, U, sets[0], problem.c))
+    for hold in reversed(holds):
+        both = sets[0].preimage(x_of)
+        for _ in range(hold):
+            k -= 1
+            X = _tightened(problem.state_set, problem.state_margins, k)
+            U = _tightened(problem.control_set, problem.control_margins, k)
+            if hold == 1:
+                before = backward_reachable(problem.A, problem.B, X, U, sets[0], problem.c)
+            else:
+                both = Polyhedron(both.H, both.h - both.H @ drift).preimage(ahead)
+                both = both.intersection(X.preimage(x_of)).intersection(U.preimage(u_of))
+                before = project(both, n)
+            sets.insert(0, before)
     return sets
 
 

@@ -17,8 +17,7 @@ import daqp
 import numpy as np
 
 from labs.algorithms.linear_mpc_limits import KINDS, Terms, TwoSided, sets, tolerance
-from labs.errors import LabError
-from labs.problems.linear_mpc import LinearMpcProblem
+from labs.problems.linear_mpc import LinearMpcProblem, check_holds
 
 SETTINGS = {"primal_tol": 1e-9, "dual_tol": 1e-9, "eq_reduction": -1}
 SOLVED, INFEASIBLE, FAILED = 1, -1, -9
@@ -186,11 +185,7 @@ def _held(N: int, m: int, total: int, holds: Sequence[int] | None) -> np.ndarray
     """T (N m, w)."""
     if holds is None:
         return np.eye(N * m)
-    if sum(holds) != total or min(holds) < 1:
-        raise LabError(
-            f"controls held over {list(holds)} steps: these are {sum(holds)}, and the horizon has "
-            f"{total}; each takes at least one"
-        )
+    check_holds(holds, total)
     blocks = np.repeat(np.arange(len(holds)), holds)[max(total - N, 0) :]
     blocks = np.concatenate([np.full(N - len(blocks), blocks[0]), blocks])
     used = np.unique(blocks)

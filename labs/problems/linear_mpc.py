@@ -12,6 +12,7 @@ least at the reference (economic MPC). X may be tightened along the horizon, as 
 constraints do.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,3 +98,12 @@ class LinearMpcProblem:
     @property
     def m(self) -> int:
         return int(np.shape(self.B)[-1])
+
+
+def check_holds(holds: Sequence[int], N: int) -> None:
+    """Raises LabError unless controls held over holds[0], holds[1], ... steps fill N steps."""
+    if sum(holds) != N or min(holds) < 1:
+        raise LabError(
+            f"controls held over {list(holds)} steps: these are {sum(holds)}, and the horizon has "
+            f"{N}; each takes at least one"
+        )

@@ -76,6 +76,10 @@ class MpcFeasibility(Lab[MpcFeasibilityParams, MpcFeasibilityState]):
             "system": "joint", "x1": 0.3, "x2": 0.4, "goal": 0.0, "p_max": 0.5, "u_max": 1.2,
             "terminal": "still",
         },
+        "Joint in blocks": {
+            "system": "joint", "x1": 0.0, "goal": 0.2, "p_max": 0.5, "u_max": 1.2, "horizon": 8.0,
+            "terminal": "admissible", "block": "4",
+        },
     }  # fmt: skip
     handles = (
         Handle("state", "Where the system is: a run begins anew from there."),
@@ -158,6 +162,7 @@ class MpcFeasibility(Lab[MpcFeasibilityParams, MpcFeasibilityState]):
             "u_low": -u_max,
             "failures": float(state.failures),
             "share": 100.0 * sets.share,
+            "decided": float(len(params.setup.holds)),
         }
         if state.failed >= 0:
             measured["failed"] = float(state.failed)
@@ -239,7 +244,9 @@ def _planner(setup: Setup, soft: bool) -> Planner:
     at = feasibility(setup)
     if at.trouble:
         return NoPlanner(at.trouble)
-    return LinearPlanner(at.problem, penalty=PENALTY if soft else None)
+    if soft:
+        return LinearPlanner(at.problem, penalty=PENALTY)
+    return LinearPlanner(at.problem, holds=setup.holds if setup.block > 1 else None)
 
 
 def _plan(params: MpcFeasibilityParams, state: MpcFeasibilityState) -> MpcFeasibilityState:

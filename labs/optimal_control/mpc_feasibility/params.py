@@ -87,6 +87,13 @@ class MpcFeasibilityParams(Params):
         "stage", {"stage": "Q, as on the way", "riccati": "P, Riccati's"}, "Terminal cost", "l_f"
     )
     """The weight of where a plan ends."""
+    block: str = PROBLEM.choice(
+        "1",
+        {"1": "None", "2": "2 periods", "4": "4 periods"},
+        "Blocks",
+        when={"fallback": ("tail", "brake")},
+    )
+    """Over how many periods a plan holds each control: fewer are to be decided."""
     q_v: float = PROBLEM.knob(0.1, 0.001, 10.0, "q_v", "", "Velocity's weight", scale="log")
     """Weight of the velocity, in its natural unit; that of the position is 1."""
     r: float = PROBLEM.knob(0.1, 0.001, 10.0, "r", "", "Control's weight", scale="log")
@@ -124,4 +131,5 @@ class MpcFeasibilityParams(Params):
             weights=(self.q_v, self.r),
             terminal=self.terminal if self.state_limits else "none",
             riccati=self.terminal_cost == "riccati",
+            block=int(self.block) if self.acts("block") else 1,
         )

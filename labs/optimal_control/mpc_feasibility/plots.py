@@ -71,6 +71,7 @@ PLOTS: tuple[Plot, ...] = (
     Readout("leak", "X₁ outside X₀", "%"),
     Readout("share", "X₀'s share of C∞", "%"),
     Readout("t_star", "t*", "", whole=True),
+    Readout("decided", "Controls a plan decides", "", whole=True),
 )
 
 

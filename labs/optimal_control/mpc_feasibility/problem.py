@@ -33,6 +33,14 @@ class Setup:
     weights: tuple[float, float]
     terminal: str
     riccati: bool
+    block: int = 1
+    """Periods over which a planned control is held."""
+
+    @property
+    def holds(self) -> tuple[int, ...]:
+        """Over how many periods each of a plan's controls is held; the last may be shorter."""
+        whole, rest = divmod(self.N, self.block)
+        return (self.block,) * whole + (rest,) * (rest > 0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -55,7 +55,7 @@ def sets_of(setup: Setup) -> Sets:
     invariant = vertices(largest)
     if not setup.state_limits:
         return Sets((), None, invariant, None, np.nan, 1.0, 0.0, 0.0, ())
-    sets = feasible_sets(problem)
+    sets = feasible_sets(problem, setup.holds)
     chain = tuple(vertices(each) for each in (sets if problem.terminal_set else sets[:-1]))
     ahead = vertices(sets[1].intersection(at.box))
     outside = beyond(chain[0], largest), beyond(ahead, sets[0])

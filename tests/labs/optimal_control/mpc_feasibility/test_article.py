@@ -8,7 +8,7 @@ import pytest
 
 from labs.engine.catalog import find
 from labs.engine.run import World
-from labs.optimal_control.mpc_feasibility.lab import MpcFeasibilityState
+from labs.optimal_control.mpc_feasibility.lab import MpcFeasibility, MpcFeasibilityState
 from labs.optimal_control.mpc_feasibility.params import MpcFeasibilityParams
 from labs.optimal_control.mpc_feasibility.problem import feasibility
 from labs.optimal_control.mpc_feasibility.sets import sets_of
@@ -177,6 +177,20 @@ def test_a_pendulum_that_cannot_be_kept_has_plans_at_first(setting: Settings) ->
     dead = [sizes(setting, horizon=N)["dead"] for N in (3.0, 6.0, 12.0, 24.0)]
     assert (np.diff(dead) < 0.0).all()
     assert dead[2] > 1e-4
+
+
+def test_blocks_leave_fewer_controls_and_plans() -> None:
+    """And break the promise of a control invariant terminal set."""
+    blocks = MpcFeasibility.presets["Joint in blocks"]
+    free, two, four = (sizes(blocks, block=block) for block in "124")
+    assert [found["decided"] for found in (free, two, four)] == [8, 4, 2]
+    assert free["share"] == pytest.approx(100.0, abs=0.01)
+    assert free["leak"] == pytest.approx(0.0, abs=1e-6)
+    assert four["share"] == pytest.approx(91.0, abs=0.5)
+    assert min(two["leak"], four["leak"]) > 2.0
+    notes = find("mpc-feasibility").lab.notes
+    world = begun(blocks)
+    assert "The terminal set is control invariant" in notes(world.params, world.state)["planner"]
 
 
 def test_every_experiment_is_verified() -> None:

@@ -37,6 +37,36 @@ def test_there_is_a_plan_exactly_in_the_first_feasible_set(system: str, terminal
     assert (sets.excess <= 1e-6) == (safe or (system, terminal) == ("cart", "still"))
 
 
+@pytest.mark.parametrize("block", ["2", "4"])
+@pytest.mark.parametrize("terminal", ["none", "origin", "admissible"])
+def test_so_is_there_one_of_blocks(terminal: str, block: str) -> None:
+    """A plan over six periods, whose controls are held: so it is, and there are fewer of them."""
+    base = MpcFeasibilityParams(
+        system="joint", terminal=terminal, goal=0.1, horizon=6.0, block=block, u_max=1.2, p_max=0.6
+    )
+    sets, free = sets_of(base.setup), sets_of(base.change({"block": "1"}).setup)
+    assert sets.rows is not None
+    corners = sets.rows[0]
+    starts = np.random.default_rng(3).uniform(-0.7, 0.7, (40, 2)).round(2)
+    told = []
+    for x1, x2 in starts:
+        state = begun(base.change({"x1": float(x1), "x2": float(x2)}))
+        told.append(state.failed < 0)
+        if told[-1]:
+            plan = state.controller.plan
+            assert plan is not None
+            held = np.repeat(plan.U[:: int(block)], int(block), axis=0)[:6]
+            np.testing.assert_array_equal(plan.U, held)
+    assert corners.contains(starts).tolist() == told
+    assert sets.share <= free.share + 1e-9
+    assert len(base.setup.holds) == {"2": 3, "4": 2}[block]
+
+
+def test_softened_plans_have_no_blocks() -> None:
+    params = MpcFeasibilityParams(fallback="soft", block="4")
+    assert params.setup.holds == (1,) * 5
+
+
 @pytest.mark.parametrize("system", SYSTEMS)
 def test_the_pieces_beyond_a_set_and_what_is_within_make_the_whole(system: str) -> None:
     params = MpcFeasibilityParams(system=system, u_max=0.8, horizon=3.0)

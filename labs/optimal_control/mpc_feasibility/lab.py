@@ -77,8 +77,8 @@ class MpcFeasibility(Lab[MpcFeasibilityParams, MpcFeasibilityState]):
             "terminal": "still",
         },
         "Joint in blocks": {
-            "system": "joint", "x1": 0.0, "goal": 0.2, "p_max": 0.5, "u_max": 1.2, "horizon": 8.0,
-            "terminal": "admissible", "block": "4",
+            "system": "joint", "x1": 0.28, "x2": 0.74, "goal": 0.2, "p_max": 0.5, "u_max": 1.2,
+            "horizon": 8.0, "terminal": "admissible", "block": "4",
         },
     }  # fmt: skip
     handles = (

@@ -188,8 +188,10 @@ def test_blocks_leave_fewer_controls_and_plans() -> None:
     assert free["leak"] == pytest.approx(0.0, abs=1e-6)
     assert four["share"] == pytest.approx(91.0, abs=0.5)
     assert min(two["leak"], four["leak"]) > 2.0
+    world, whole = run(blocks, 1.0), run({**blocks, "block": "1"}, 1.0)
+    assert state(world).failed == 1
+    assert state(whole).failures == 0
     notes = find("mpc-feasibility").lab.notes
-    world = begun(blocks)
     assert "The terminal set is control invariant" in notes(world.params, world.state)["planner"]
 
 

@@ -163,14 +163,14 @@ class Collocation:
     def equality_name(self, i: int) -> str:
         """What c_i says."""
         part = int(np.searchsorted(self._starts, i, side="right")) - 1
-        k = i - int(self._starts[part])
+        k, x = i - int(self._starts[part]), self.problem.x_names
         if part == 0:
-            return f"the start of state {k + 1}"
+            return f"the start of {x[k]}"
         if part == 1:
             step, _, component = (int(a[0]) for a in np.nonzero(self.grid.rows == k))
-            return f"the defect of state {component + 1} in step {step + 1}{self._when(step)}"
+            return f"the defect of {x[component]} in step {step + 1}{self._when(step)}"
         if part == 2:
-            return f"the wanted end of state {int(self._ends[k]) + 1}"
+            return f"{x[self._ends[k]]} at the end"
         assert self.problem.end
         return f"{self.problem.end.name(k)} at the end"
 
@@ -183,11 +183,10 @@ class Collocation:
     def variable_name(self, i: int) -> str:
         """What y_i is."""
         if self.free_time and i == self.n - 1:
-            return "the final time T"
-        nx, grid = self.problem.dynamics.nx, self.grid
-        block, k = divmod(i, nx + self.problem.dynamics.nu)
-        what = f"state {k + 1}" if k < nx else f"control {k - nx + 1}"
-        return f"{what}{self._when(grid.block_times[block] * self.N)}"
+            return "the horizon T"
+        names, grid = self.problem.x_names + self.problem.u_names, self.grid
+        block, k = divmod(i, len(names))
+        return f"{names[k]}{self._when(grid.block_times[block] * self.N)}"
 
     def _when(self, step: float) -> str:
         """At the start of a step."""

@@ -198,7 +198,7 @@ def check_limits(problem: ContinuousProblem, found: Extremal) -> Extremal:
     i, j = np.unravel_index(int(np.argmax(over)), over.shape)
     nx = problem.dynamics.nx
     assert problem.path is not None or j < nx
-    what = f"the limit on x_{j + 1}" if j < nx else problem.path.name(int(j) - nx)  # type: ignore[union-attr]
+    what = f"the limit on {problem.x_names[j]}" if j < nx else problem.path.name(int(j) - nx)  # type: ignore[union-attr]
     stopped = (
         f"Infeasible: the conditions are met, but they know no limits on x, and at t = "
         f"{found.t[i]:.3g} s {what} is exceeded by {over[i, j]:.2g}."

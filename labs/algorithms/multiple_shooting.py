@@ -222,12 +222,12 @@ class MultipleShooting:
 
     def equality_name(self, i: int) -> str:
         """What c_i says."""
-        segment, k = divmod(i, self.nx)
+        (segment, k), x = divmod(i, self.nx), self.problem.x_names
         if segment >= self.segments.m:
             return self._constraints.end_names[i - self.segments.m * self.nx]
         if segment == 0:
-            return f"the start of x_{k + 1}"
-        return f"the gap of x_{k + 1} between segments {segment} and {segment + 1}"
+            return f"the start of {x[k]}"
+        return f"the gap of {x[k]} between segments {segment} and {segment + 1}"
 
     def inequality_name(self, i: int) -> str:
         """What g_i says."""
@@ -238,17 +238,14 @@ class MultipleShooting:
         """What z_i is."""
         if self.free_time and i == self.n - 1:
             return "the horizon T"
-        for what, where, many in (
-            (
-                "x_{k} at the start of segment {row} of {many}",
-                self.segments.starts,
-                self.segments.m,
-            ),
-            ("u_{k} in piece {row} of {many}", self.segments.controls, self.N),
+        cut, problem = self.segments, self.problem
+        for names, what, where, many in (
+            (problem.x_names, "at the start of segment", cut.starts, cut.m),
+            (problem.u_names, "in piece", cut.controls, self.N),
         ):
             row, k = np.nonzero(where == i)
             if len(row):
-                return what.format(k=k[0] + 1, row=row[0] + 1, many=many)
+                return f"{names[k[0]]} {what} {row[0] + 1} of {many}"
         raise IndexError(i)
 
     # Parts ------------------------------------------------------------------------------------

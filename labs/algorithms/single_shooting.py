@@ -233,7 +233,7 @@ class SingleShooting:
         if i == self.N * self.nu:
             return "the horizon T"
         piece, motor = divmod(i, self.nu)
-        return f"u_{motor + 1} in piece {piece + 1} of {self.N}"
+        return f"{self.problem.u_names[motor]} in piece {piece + 1} of {self.N}"
 
     @cached_property
     def _w_y(self) -> np.ndarray:

@@ -24,15 +24,20 @@ class StateConstraints:
         self._below = np.flatnonzero(np.isfinite(problem.x_lower))
         self._goal = np.full(nx, np.nan) if problem.x_final is None else problem.x_final
         self._fixed = np.flatnonzero(np.isfinite(self._goal))
+        x = problem.x_names
         self.names: tuple[str, ...] = (
-            *(f"the upper bound of x_{i + 1}" for i in self._above),
-            *(f"the lower bound of x_{i + 1}" for i in self._below),
+            *(f"the upper bound of {x[i]}" for i in self._above),
+            *(f"the lower bound of {x[i]}" for i in self._below),
             *((self._path.name(i) for i in range(self._path.size)) if self._path else ()),
         )
         """What each of the m inequalities says, without when."""
         self.end_names: tuple[str, ...] = (
-            *(f"x_{i + 1} at the end" for i in self._fixed),
-            *((self._end.name(i) for i in range(self._end.size)) if self._end else ()),
+            *(f"{x[i]} at the end" for i in self._fixed),
+            *(
+                (f"{self._end.name(i)} at the end" for i in range(self._end.size))
+                if self._end
+                else ()
+            ),
         )
 
     @property

@@ -8,6 +8,24 @@ NAMES: Mapping[str, tuple[str, ...]] = {"cart-pole": ("cart", "pole"), "mass": (
 """Where the parts have names; else they have numbers."""
 
 
+def names_in_sentences(mechanism: Mechanism) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What each state (nx,) and each control (nu,) is called: "q_2", "the cart's v", "u"."""
+    words = coordinate_labels(mechanism)
+    q, v, u = (
+        tuple(_called(symbol, name, len(names)) for name in names)
+        for symbol, names in zip(
+            "qvu", (words["joint"], words["joint"], words["motor"]), strict=True
+        )
+    )
+    return q + v, u
+
+
+def _called(symbol: str, name: str, of: int) -> str:
+    if of == 1:
+        return symbol
+    return f"{symbol}_{name}" if name.isdigit() else f"the {name}'s {symbol}"
+
+
 def coordinate_labels(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
     """For `Lab.labels`: the names of the joints and of the motors, and the units of each joint's
     position, of its velocity, and of each motor's control."""

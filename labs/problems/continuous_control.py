@@ -112,9 +112,18 @@ class ContinuousProblem:
     """g"""
     end: StateConstraint | None = None
     """e"""
+    x_names: tuple[str, ...] = ()
+    """What each state is called in a sentence; empty: x_1, x_2, ..."""
+    u_names: tuple[str, ...] = ()
+    """Likewise of each control; empty: u_1, u_2, ..."""
 
     def __post_init__(self) -> None:
         nx, nu = self.dynamics.nx, self.dynamics.nu
+        for what, n in (("x", nx), ("u", nu)):
+            names = getattr(self, f"{what}_names") or tuple(f"{what}_{i + 1}" for i in range(n))
+            if len(names) != n:
+                raise LabError(f"{what}_names are {len(names)}; this system takes {n}")
+            object.__setattr__(self, f"{what}_names", names)
         shapes = {"x_0": nx, "x_lower": nx, "x_upper": nx, "u_lower": nu, "u_upper": nu}
         given = (self.x0, self.x_lower, self.x_upper, self.u_lower, self.u_upper)
         for (name, n), array in zip(shapes.items(), given, strict=True):

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labs.errors import LabError
+from labs.models.coordinates import names_in_sentences
 from labs.models.mechanisms import mechanism
 from labs.problems.continuous_control import ContinuousProblem
 from labs.tasks.motion.continuous_cost import ContinuousMotionCost, SoftLimits
@@ -114,6 +115,7 @@ def continuous_motion(
         T_limits,
         path,
         end,
+        *names_in_sentences(system),
     )
 
 

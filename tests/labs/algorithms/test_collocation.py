@@ -256,7 +256,7 @@ def test_what_cannot_be_reached_is_infeasible_and_says_why() -> None:
     hurried = continuous_motion("pendulum", "least-energy", 0.5, limits=limits)
     at = solved(hurried, 20, "midpoint")
     assert at.infeasible, at.stopped
-    assert "at t = " in at.stopped or "the wanted end" in at.stopped
+    assert "at t = " in at.stopped or " at the end is off" in at.stopped
     beyond = continuous_motion("mass", "least-energy", 1.0, limits=MotionLimits((), (0.5,)))
     at = solved(beyond, 10, "trapezoidal")
     assert at.infeasible, at.stopped
@@ -265,11 +265,11 @@ def test_what_cannot_be_reached_is_infeasible_and_says_why() -> None:
 def test_names_say_what_and_when() -> None:
     program = Collocation(everything("cart-pole"), 4, "trapezoidal")
     fixed = Collocation(continuous_motion("cart-pole", "least-energy", 2.0), 4, "midpoint")
-    assert fixed.equality_name(1) == "the start of state 2"
-    assert fixed.equality_name(4 + 4 * 2 + 3) == "the defect of state 4 in step 3 at t = 1 s"
-    assert fixed.equality_name(4 + 16 + 1) == "the wanted end of state 2"
-    assert fixed.variable_name(5 + 4) == "control 1 at t = 0.5 s"
-    assert program.variable_name(program.n - 1) == "the final time T"
+    assert fixed.equality_name(1) == "the start of the pole's q"
+    assert fixed.equality_name(4 + 4 * 2 + 3) == "the defect of the pole's v in step 3 at t = 1 s"
+    assert fixed.equality_name(4 + 16 + 1) == "the pole's q at the end"
+    assert fixed.variable_name(5 + 4) == "u at t = 0.5 s"
+    assert program.variable_name(program.n - 1) == "the horizon T"
     assert program.inequality_name(2) == "the tip's distance from obstacle 1 at t = 0.5 T"
     reaching = Collocation(reach(), 4)
     assert reaching.equality_name(len(reaching.values(np.ones(reaching.n)).c) - 1) == (

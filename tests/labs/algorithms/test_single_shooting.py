@@ -187,7 +187,7 @@ def test_a_diverging_rollout_has_no_cost_and_says_where() -> None:
 def test_names_say_what_and_where() -> None:
     shooting = constrained(np.random.default_rng(8), "pendulum")
     assert shooting.equality_name(0) == "x_2 at the end"
-    assert shooting.equality_name(1) == "the distance from the circle"
+    assert shooting.equality_name(1) == "the distance from the circle at the end"
     size = len(shooting.values(shooting.pack(np.zeros((4, 1)))).g) // 4
     assert size == 5
     names = [shooting.inequality_name(size + i) for i in range(size)]

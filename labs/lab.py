@@ -98,6 +98,10 @@ P = TypeVar("P", bound=Params)
 S = TypeVar("S", bound=State)
 
 
+ChoiceSettings = Mapping[str, Mapping[Value, Mapping[str, Value]]]
+"""By the name of a choice and one of its values."""
+
+
 class Lab(abc.ABC, Generic[P, S]):
     """One lab. It has a world's clock (`step`), a solver's clock (`solve`), both or neither.
 
@@ -114,9 +118,24 @@ class Lab(abc.ABC, Generic[P, S]):
     """[s] simulated by one step of the world's clock; every step is recorded."""
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {}
     """Named settings; a preset starts from the defaults."""
+    choice_settings: ClassVar[ChoiceSettings] = {}
+    """What else is set when a hand chooses one of a choice's values, such as the horizon that a
+    robot takes; choosing another brings the defaults back. Of choices that restart."""
     actions: ClassVar[tuple[Action, ...]] = ()
     handles: ClassVar[tuple[Handle, ...]] = ()
     """All that `draw` may offer to be dragged or clicked."""
+
+    @classmethod
+    def changed_params(cls, before: P, changes: Mapping[str, object]) -> P:
+        """With the changes, and the settings that go with choices among them (`choice_settings`);
+        what is given holds. Raises ParameterError."""
+        after, defaults, more = before.change(changes), cls.Params(), dict[str, object]()
+        for name, settings in cls.choice_settings.items():
+            left, taken = getattr(before, name), getattr(after, name)
+            if left != taken:
+                more |= {other: getattr(defaults, other) for other in settings.get(left, {})}
+                more |= settings.get(taken, {})
+        return after.change(more | dict(changes))
 
     @abc.abstractmethod
     def init(self, params: P, rng: np.random.Generator) -> S:

@@ -122,7 +122,7 @@ class World:
 
     def change(self, changes: Mapping[str, object]) -> None:
         """New values for some parameters, seen from the next step on. Raises ParameterError."""
-        params = self.params.change(changes)
+        params = self.lab.changed_params(self.params, changes)
         changed = params.changed_from(self.params)
         if not changed:
             return

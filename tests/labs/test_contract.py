@@ -155,6 +155,16 @@ def test_defaults_are_valid(entry: Entry) -> None:
 
 
 @every_lab
+def test_settings_that_go_with_a_choice_are_valid(entry: Entry) -> None:
+    defaults = entry.lab.Params()
+    for name, by_value in entry.lab.choice_settings.items():
+        assert defaults.tunables[name].effect == "restart", "or a run could not be reproduced"
+        for value, more in by_value.items():
+            assert name not in more
+            defaults.change({name: value, **more})
+
+
+@every_lab
 def test_parameters_survive_as_text(entry: Entry) -> None:
     """A link and a command line hold every extreme value exactly."""
     params = entry.lab.Params

@@ -79,7 +79,7 @@ def step_in_pieces(program: NonlinearProgram, options: Options, at: Iterate) -> 
         change = at.gradient(at.derivatives) - at.gradient(before.derivatives)
         at = replace(at, learnt=at.learnt.updated(at.y - before.y, change))
     if not at.stopped:
-        at = replace(at, stopped=_stop_short(program, options, before, at))
+        at = _stopped_short(program, options, before, at)
     return replace(at, seconds=seconds)
 
 
@@ -124,19 +124,23 @@ def _expanded(program: NonlinearProgram, options: Options, at: Iterate) -> Resum
     return at
 
 
-def _stop_short(program: NonlinearProgram, options: Options, before: Iterate, at: Iterate) -> str:
-    """Why to stop here without convergence, if there is a reason."""
+def _stopped_short(
+    program: NonlinearProgram, options: Options, before: Iterate, at: Iterate
+) -> Iterate:
+    """Stopped here without convergence, if there is a reason."""
     assert at.optimality
     change = float((np.abs(at.y - before.y) / (1.0 + np.abs(at.y))).max(initial=0.0))
     stalled = at.alpha == 1.0 and change < STALLED and not at.penalty
     if not stalled and at.iteration < options.iterations:
-        return ""
+        return at
     where = f"KKT residual {at.optimality.residual:.1e}; {worst_violation(program, at.values)}"
     if stalled:
-        return f"Stopped short: steps have become too small to be told from rounding, {where}."
-    return (
+        stopped = f"Stopped short: steps have become too small to be told from rounding, {where}."
+        return replace(at, stopped=stopped)
+    stopped = (
         f"Stopped short after {at.iteration} iterations: {where}. Solve again from here to go on."
     )
+    return replace(at, stopped=stopped, out_of_iterations=True)
 
 
 def _convergence_message(at: Iterate) -> str:

@@ -89,6 +89,8 @@ class Iterate:
     converged: bool = False
     infeasible: bool = False
     """Whether it stopped because nothing lowers the violation."""
+    out_of_iterations: bool = False
+    """Whether it stopped because there were no more of them."""
     seconds: Mapping[str, float] = field(default_factory=dict)
     """Of the wall clock, spent by the last iteration in derivatives, QP and line search."""
     derivatives: Derivatives | None = None
@@ -105,6 +107,11 @@ class Iterate:
     """What the QPs are solved with, which remembers their structure."""
     largest_gradient: float = 0.0
     """The largest |f_y| met so far."""
+
+    @property
+    def reusable(self) -> bool:
+        """Whether another solve may begin here: not where this one was infeasible or failed."""
+        return not self.stopped or self.converged or self.out_of_iterations
 
     @property
     def violation(self) -> float:

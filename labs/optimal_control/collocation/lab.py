@@ -26,10 +26,11 @@ from labs.optimal_control.collocation.transcription import Costates, costates
 from labs.params import Value
 from labs.resumable import Resumable, run_to_completion
 from labs.scene import Scene
-from labs.tasks.direct.guesses import first_guess, resampled
+from labs.tasks.direct.guesses import first_guess, start_guess, warm
 from labs.tasks.direct.history import History
 from labs.tasks.direct.motions import collocated_motion
 from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots
+from labs.tasks.direct.plan_params import CHOICE_SETTINGS
 from labs.tasks.direct.player import (
     DirectState,
     advanced,
@@ -41,6 +42,9 @@ from labs.tasks.direct.player import (
 from labs.tasks.direct.tracking import playable
 from labs.tasks.motion.playback import start_playback
 from labs.tasks.motion.player import PERIOD
+
+OWN = ("reusable", "variables", "structure", "costates", "study")
+"""Of the state, beside what is played."""
 
 
 @dataclass(kw_only=True)
@@ -68,11 +72,12 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Mass, least time": {"system": "mass", "objective": "least-time", "limit": 1.0},
         "Weak motor": {"limited": True, "limit": 0.3, "horizon": 3.0, "guess": "controls"},
-        "Double pendulum": {"system": "double-pendulum"},
+        "Double pendulum": {"system": "double-pendulum", "limit": 1.0},
         "Cart-pole": {"system": "cart-pole"},
         "UR5 reach": {"system": "ur5", "horizon": 1.0},
         "UR5 past an obstacle": {"system": "ur5", "horizon": 1.0, "obstacle": True},
     }
+    choice_settings = CHOICE_SETTINGS
     handles = (
         Handle("target", "The UR5's target."),
         Handle("obstacle", "The ball that the UR5's tip must not enter."),
@@ -105,7 +110,8 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
         program, seconds = params.program, dict[str, Any]()
         at = _start(params, program, state)
         if at.stopped:
-            yield Snapshot(1, _kept(state, seconds), at.stopped)
+            kept = replace(state, failed=True, reusable=False)
+            yield Snapshot(1, _kept(kept, seconds), at.stopped)
             return
         history = History.start(params, at, collocated_motion(program, at))
         structure = state.structure if state.structure.variables == program.n else None
@@ -125,6 +131,7 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
                 plan=playable(params, motion),
                 history=history,
                 failed=bool(at.stopped) and not at.converged,
+                reusable=at.reusable,
                 variables=Variables(at.y, at.lam, at.mu, at.nu),
                 structure=structure,
                 costates=costates(program, at),
@@ -145,7 +152,7 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
         state = replayed(state, *(data[name] for name in names))
         return replace(
             state,
-            **{name: data[name] for name in ("variables", "structure", "costates", "study")},
+            **{name: data[name] for name in OWN},
             seconds=data.get("seconds", {}),
         )
 
@@ -210,14 +217,10 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
 def _start(params: CollocationParams, program: Collocation, state: CollocationState) -> Iterate:
     """From the present solution, if there is one and it is wanted, with its multipliers if the grid
     is the same."""
-    if params.start == "cold" or not state.history.iterations or state.failed:
-        y = program.variables(*first_guess(params, params.N))
-        return sqp.init(program, y, params.options)
-    last = state.variables
-    if len(last.y) != program.n:
-        y = program.variables(*resampled(params, state.motion, params.N))
-        return sqp.init(program, y, params.options)
-    return sqp.restart(program, last, params.options)
+    if warm(params, state.reusable) and len(state.variables.y) == program.n:
+        return sqp.restart(program, state.variables, params.options)
+    guess = start_guess(params, state.motion, state.reusable, params.N)
+    return sqp.init(program, program.variables(*guess), params.options)
 
 
 def _structure(program: Collocation, at: Iterate) -> Resumable[Structure]:
@@ -227,5 +230,5 @@ def _structure(program: Collocation, at: Iterate) -> Resumable[Structure]:
 
 
 def _kept(state: CollocationState, seconds: Mapping[str, Any]) -> dict[str, Any]:
-    names = ("motion", "plan", "history", "failed", "variables", "structure", "costates", "study")
+    names = ("motion", "plan", "history", "failed", *OWN)
     return {name: getattr(state, name) for name in names} | {"seconds": seconds}

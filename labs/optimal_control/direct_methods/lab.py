@@ -24,6 +24,7 @@ from labs.optimal_control.direct_methods.race import Race, lined_up, run_race, v
 from labs.params import Value
 from labs.scene import Scene
 from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots
+from labs.tasks.direct.plan_params import CHOICE_SETTINGS
 from labs.tasks.direct.player import (
     DirectState,
     advanced,
@@ -59,7 +60,7 @@ class DirectMethodsLab(Lab[DirectMethodsParams, DirectMethodsState]):
     plots = PLOTS
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Upright": {"system": "upright"},
-        "Double pendulum": {"system": "double-pendulum", "segments": 10.0},
+        "Double pendulum": {"system": "double-pendulum", "limit": 1.0, "segments": 10.0},
         "Cart-pole": {"system": "cart-pole"},
         "Mass, least time": {"system": "mass", "objective": "least-time", "limit": 1.0},
         "UR5 reach": {"system": "ur5", "horizon": 1.0, "pieces": 10.0},
@@ -70,6 +71,7 @@ class DirectMethodsLab(Lab[DirectMethodsParams, DirectMethodsState]):
             "obstacle": True,
         },
     }
+    choice_settings = CHOICE_SETTINGS
     handles = (
         Handle("target", "The UR5's target."),
         Handle("obstacle", "The ball that the UR5's tip must not enter."),

@@ -3,7 +3,7 @@
 from labs.optimal_control.direct_methods.methods import METHODS
 from labs.params import Group
 from labs.tasks.direct.params import WORLD, DirectParams
-from labs.tasks.direct.plan_params import LIGHT, SOLVER
+from labs.tasks.direct.plan_params import LIGHT
 
 MOST_PIECES, MOST_STEPS = 40, 4
 MOST_HEAVY_PIECES = 12
@@ -35,11 +35,6 @@ class DirectMethodsParams(DirectParams):
         2.0, 1.0, MOST_STEPS, "M", "", "Steps a piece", step=1.0, when={"system": LIGHT}
     )
     """Steps of Runge-Kutta 4 in each piece, in both kinds of shooting. Of the UR5 it is one."""
-
-    start: str = SOLVER.choice(
-        "cold", {"warm": "Warm: the present solution", "cold": "Cold: the first guess"}, "Start"
-    )
-    """What a change of the problem is solved from."""
 
     @property
     def N(self) -> int:

@@ -11,7 +11,7 @@ from labs.optimal_control.direct_methods.methods import METHODS, Transcription, 
 from labs.optimal_control.direct_methods.params import DirectMethodsParams
 from labs.optimal_control.direct_methods.structure import Structure, structure_of
 from labs.resumable import Resumable, run_to_completion
-from labs.tasks.direct.guesses import Guess, first_guess, resampled
+from labs.tasks.direct.guesses import Guess, first_guess, start_guess
 from labs.tasks.direct.history import History
 from labs.tasks.direct.trajectory import Trajectory
 
@@ -26,6 +26,8 @@ class Entrant:
     stopped: str = ""
     """Why, in a sentence; empty while it goes on."""
     converged: bool = False
+    reusable: bool = False
+    """Whether a change may be solved from the motion: it is of a solve that did not fail."""
 
     @property
     def failed(self) -> bool:
@@ -56,7 +58,8 @@ def run_race(
     iterates, race = dict[str, Iterate](), dict[str, Entrant]()
     total = dict.fromkeys(methods, 0.0)
     for name, method in methods.items():
-        y = method.variables(_guess(params, before[name]))
+        guess = start_guess(params, before[name].motion, before[name].reusable, params.N)
+        y = method.variables(guess)
         iterates[name] = sqp.init(method.program, y, params.options)
         race[name] = yield from _entrant(params, method, iterates[name])
     if all(at.stopped for at in iterates.values()):
@@ -96,13 +99,6 @@ def _transcriptions(params: DirectMethodsParams) -> Mapping[str, Transcription]:
     return transcribe(params.problem, params.N, params.m, params.M)
 
 
-def _guess(params: DirectMethodsParams, before: Entrant) -> Guess:
-    """What to start from: the present solution, if there is one and it is wanted."""
-    if params.start == "cold" or not before.converged:
-        return first_guess(params, params.N)
-    return resampled(params, before.motion, params.N)
-
-
 def _entrant(params: DirectMethodsParams, method: Transcription, at: Iterate) -> Resumable[Entrant]:
     """At its first guess; at rest at the start where that diverges."""
     shown = at
@@ -131,4 +127,5 @@ def _later(
         structure=structure,
         stopped=at.stopped,
         converged=at.converged,
+        reusable=at.reusable,
     )

@@ -24,10 +24,11 @@ from labs.optimal_control.multiple_shooting.study import Study, no_study, study_
 from labs.params import Value
 from labs.resumable import run_to_completion
 from labs.scene import Scene
-from labs.tasks.direct.guesses import first_guess, resampled
+from labs.tasks.direct.guesses import first_guess, start_guess
 from labs.tasks.direct.history import History
 from labs.tasks.direct.motions import multiple_shooting_motion
 from labs.tasks.direct.picture import draw_goal, draw_now, draw_robots
+from labs.tasks.direct.plan_params import CHOICE_SETTINGS
 from labs.tasks.direct.player import DirectState, advanced, dragged, measured, replayed
 from labs.tasks.direct.tracking import playable
 from labs.tasks.motion.playback import start_playback
@@ -57,10 +58,16 @@ class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Single shooting": {"segments": 1.0},
         "Upright": {"system": "upright", "horizon": 4.0, "pieces": 40.0, "segments": 20.0},
-        "Double pendulum": {"system": "double-pendulum", "horizon": 1.5, "segments": 20.0},
+        "Double pendulum": {
+            "system": "double-pendulum",
+            "limit": 1.0,
+            "horizon": 1.5,
+            "segments": 20.0,
+        },
         "Cart-pole": {"system": "cart-pole"},
         "UR5": {"system": "ur5", "horizon": 1.0, "obstacle": True},
     }
+    choice_settings = CHOICE_SETTINGS
     handles = (
         Handle("target", "Where the tip of the UR5 should end."),
         Handle("obstacle", "What the tip of the UR5 must not enter."),
@@ -96,7 +103,7 @@ class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
         shooting, options = params.shooting(params.m), params.options
         at = sqp.init(shooting, _initial_variables(params, shooting, state), options)
         if at.stopped:
-            yield Snapshot(1, _data(state, failed=True), at.stopped)
+            yield Snapshot(1, _kept(state), at.stopped)
             return
         motion = multiple_shooting_motion(shooting, at.y)
         history = History.start(params, at, motion)
@@ -112,6 +119,7 @@ class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
                 "plan": playable(params, motion),
                 "history": history,
                 "failed": bool(at.stopped) and not at.converged,
+                "reusable": at.reusable,
                 "anatomy": found,
                 "study": no_study(),
             }
@@ -127,7 +135,8 @@ class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
         data = snapshot.data
         parts = (data[name] for name in ("motion", "plan", "history", "failed"))
         state = replayed(state, *parts)
-        return replace(state, anatomy=data["anatomy"], study=data["study"])
+        own = {name: data[name] for name in ("anatomy", "study", "reusable")}
+        return replace(state, **own)
 
     def edit(
         self, params: MultipleShootingParams, handle: str, point: tuple[float, float, float]
@@ -198,10 +207,7 @@ def _initial_variables(
     params: MultipleShootingParams, shooting: MultipleShooting, state: MultipleShootingState
 ) -> np.ndarray:
     """z to start from: the present solution, if there is one and it is wanted."""
-    if params.start == "cold" or not state.history.iterations:
-        guess = first_guess(params, params.N)
-    else:
-        guess = resampled(params, state.motion, params.N)
+    guess = start_guess(params, state.motion, state.reusable, params.N)
     return shooting.variables(guess.X, guess.U, guess.T)
 
 
@@ -219,7 +225,8 @@ def _compared(params: MultipleShootingParams, last: Snapshot) -> Iterator[Snapsh
     yield Snapshot(count + 1, {**last.data, "study": latest}, last.done)
 
 
-def _data(state: MultipleShootingState, failed: bool) -> dict[str, Any]:
-    """What there is already."""
+def _kept(state: MultipleShootingState) -> dict[str, Any]:
+    """What there is already, where the first guess diverges."""
     names = ("motion", "plan", "history", "anatomy", "study")
-    return {name: getattr(state, name) for name in names} | {"failed": failed}
+    kept = {name: getattr(state, name) for name in names}
+    return kept | {"failed": True, "reusable": False}

@@ -7,7 +7,7 @@ from labs.algorithms.shooting_steps import METHODS
 from labs.params import Group
 from labs.tasks.direct.guesses import Guess
 from labs.tasks.direct.params import DirectParams
-from labs.tasks.direct.plan_params import LIGHT, SOLVER
+from labs.tasks.direct.plan_params import LIGHT
 
 MOST_PIECES, MOST_STEPS = 40, 4
 
@@ -36,11 +36,6 @@ class MultipleShootingParams(DirectParams):
         when={"system": LIGHT},
     )
     """What is solved besides: the same problem from the same guess with 1, 2, 4, ... segments."""
-
-    start: str = SOLVER.choice(
-        "cold", {"warm": "Warm: the present solution", "cold": "Cold: the first guess"}, "Start"
-    )
-    """What a change of the problem is solved from."""
 
     @property
     def N(self) -> int:

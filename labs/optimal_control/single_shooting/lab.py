@@ -9,9 +9,10 @@ import numpy as np
 
 from labs.algorithms import riccati, sqp
 from labs.algorithms.single_shooting import SingleShooting
+from labs.algorithms.sqp import Iterate
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.optimal_control.single_shooting.history import History
-from labs.optimal_control.single_shooting.params import SingleShootingParams
+from labs.optimal_control.single_shooting.params import CHOICE_SETTINGS, SingleShootingParams
 from labs.optimal_control.single_shooting.picture import (
     dragged_control,
     draw_change,
@@ -35,6 +36,7 @@ from labs.optimal_control.single_shooting.studies import (
 )
 from labs.params import Value
 from labs.scene import Scene
+from labs.tasks.direct.guesses import warm
 from labs.tasks.direct.picture import draw_goal
 from labs.tasks.direct.player import dragged, labels_of
 from labs.tasks.motion.player import PERIOD, REST_STEPS
@@ -49,6 +51,8 @@ class SingleShootingState(State):
     study: Study = NO_STUDY
     failed: bool = False
     """Whether the last solve ended without a solution."""
+    reusable: bool = False
+    """Whether a change may be solved from the plan: it is of a solve that did not fail."""
     clock: int = 0
     """World steps since the motion began; it ends and rests, then begins anew."""
     grown: float = 0.0
@@ -85,6 +89,7 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
             "obstacle": True,
         },
     }
+    choice_settings = CHOICE_SETTINGS
     handles = (
         Handle("control", "Which control is changed, and by how much."),
         Handle("target", "The UR5's target."),
@@ -111,7 +116,8 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
         at = sqp.init(shooting, _initial_variables(params, shooting, state), params.options)
         if at.stopped:
             why = at.stopped if np.isfinite(at.values.f) else _divergence(shooting, at.y)
-            yield Snapshot(1, _snapshot_data(state.plan, state.history, state.study, True, {}), why)
+            kept = _snapshot_data(state.plan, state.history, state.study, at, {})
+            yield Snapshot(1, kept, why)
             return
         if params.studied == "gradients":
             study = yield from study_gradients(params, seconds)
@@ -123,8 +129,7 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
             history = history.append(at, _path(params, plan))
             if at.stopped and params.studied == "integration":
                 study = yield from study_integration(params, plan)
-            failed = bool(at.stopped) and not at.converged
-            data = _snapshot_data(plan, history, study, failed, seconds)
+            data = _snapshot_data(plan, history, study, at, seconds)
             yield Snapshot(at.iteration, data, at.stopped)
 
     def accept(
@@ -137,6 +142,7 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
             history=snapshot.data["history"],
             study=snapshot.data["study"],
             failed=snapshot.data["failed"],
+            reusable=snapshot.data["reusable"],
             seconds=snapshot.data.get("seconds", {}),
             clock=0,
         )
@@ -225,7 +231,7 @@ def _initial_variables(
     """y to start from: the present solution, if there is one and it is wanted. Its controls are
     taken at the middles of the new pieces, in parts of the motion."""
     plan = state.plan
-    if params.start == "cold" or not len(state.history.alpha):
+    if not warm(params, state.reusable):
         return shooting.pack(params.first_guess(params.N))
     middle = (np.arange(params.N) + 0.5) / params.N
     U = plan.U[(middle * plan.N).astype(int)]
@@ -248,13 +254,14 @@ def _snapshot_data(
     plan: Plan,
     history: History,
     study: Study,
-    failed: bool,
+    at: Iterate,
     seconds: Mapping[str, float | np.ndarray],
 ) -> dict[str, Any]:
     return {
         "plan": plan,
         "history": history,
         "study": study,
-        "failed": failed,
+        "failed": bool(at.stopped) and not at.converged,
+        "reusable": at.reusable,
         "seconds": seconds,
     }

@@ -5,12 +5,21 @@ import numpy as np
 from labs.algorithms.shooting_steps import FORMS, METHODS, CostForm
 from labs.algorithms.single_shooting import SingleShooting
 from labs.algorithms.sqp_iterate import HESSIANS
+from labs.lab import ChoiceSettings
 from labs.params import Group
 from labs.tasks.direct.plan_params import LIGHT, SOLVER, PlanParams
 
 MOST_PIECES, MOST_STEPS = 60, 8
 MOST_HEAVY_PIECES = 12
 """Of the UR5, whose derivatives cost more."""
+
+CHOICE_SETTINGS: ChoiceSettings = {
+    "system": {
+        "double-pendulum": {"horizon": 1.5, "guess": 0.5, "limit": 1.0, "hessian": "exact"},
+        "ur5": {"horizon": 1.0, "guess": 0.0},
+    }
+}
+"""With which all objectives are met but the weighted one, which takes too many iterations."""
 
 SHOOTING = Group("Shooting", effect="solve")
 ONE_CONTROL = Group("One control")

@@ -8,6 +8,7 @@ import numpy as np
 from labs.models.discrete import Discrete
 from labs.problems.optimal_control import LARGEST_STATE
 from labs.tasks.direct.params import DirectParams
+from labs.tasks.direct.plan_params import PlanParams
 from labs.tasks.direct.trajectory import Trajectory
 
 STEP = 0.01
@@ -47,6 +48,19 @@ def first_guess(params: DirectParams, N: int) -> Guess:
         last = N if sound.all() else int(np.argmin(sound)) - 1
         X = X[np.minimum(np.arange(N + 1), last)]
     return Guess(X, U, T)
+
+
+def warm(params: PlanParams, reusable: bool) -> bool:
+    """Whether to start from the present motion, which is `reusable` where the solve that it is of
+    neither failed nor was infeasible, and no first guess."""
+    return params.start == "warm" and reusable
+
+
+def start_guess(params: DirectParams, motion: Trajectory, reusable: bool, N: int) -> Guess:
+    """What a change of the problem is solved from: the present motion, or the first guess."""
+    if warm(params, reusable):
+        return resampled(params, motion, N)
+    return first_guess(params, N)
 
 
 def resampled(params: DirectParams, motion: Trajectory, N: int) -> Guess:

@@ -6,12 +6,14 @@ from dataclasses import replace
 import numpy as np
 
 from labs.algorithms.sqp_iterate import HESSIANS, Options
+from labs.lab import ChoiceSettings
 from labs.params import Group, Params
 from labs.problems.continuous_control import ContinuousProblem
 from labs.tasks.direct.systems import TITLES, System, reaching_posture, system
 from labs.tasks.motion.continuous import OBJECTIVES, MotionLimits, continuous_motion
 from labs.tasks.motion.motions import MotionWeights
 from labs.tasks.motion.tip_constraints import Ball
+from labs.tunables import Choices
 
 T_LIMITS = (0.2, 6.0)
 """[s] of a free horizon."""
@@ -21,6 +23,20 @@ NEEDS_LIMIT = ("least-time", "fastest-end")
 """Objectives that have no minimum without a limit of the control."""
 MAY_LIMIT = {"objective": tuple(name for name in OBJECTIVES if name not in NEEDS_LIMIT)}
 LIMITED = ({"limited": True}, {"objective": NEEDS_LIMIT})
+RUN_AWAY = ("double-pendulum", "ur5")
+"""Systems whose final speed has no maximum that is found without a limit of the velocity."""
+MAY_LIMIT_SPEED: tuple[Choices, ...] = (
+    {"objective": tuple(name for name in OBJECTIVES if name != "fastest-end")},
+    {"system": tuple(name for name in TITLES if name not in RUN_AWAY)},
+)
+SPEED_LIMITED: tuple[Choices, ...] = (
+    {"speed_limited": True},
+    {"objective": "fastest-end", "system": RUN_AWAY},
+)
+CHOICE_SETTINGS: ChoiceSettings = {
+    "system": {"double-pendulum": {"limit": 1.0}, "ur5": {"horizon": 1.0}}
+}
+"""With which collocation and multiple shooting meet all objectives."""
 SOFT_WEIGHT = 100.0
 """[1/s] of soft limits, passed by a unit."""
 MOTION = Group("Motion", effect="restart")
@@ -49,16 +65,25 @@ class PlanParams(Params):
         0.5, 0.2, 3.0, "u_{max}/u_0", "", "Control limit", step=0.05, when=LIMITED
     )
     """Most that a control may be, in units of its size u_0."""
-    speed_limited: bool = LIMITS.toggle(False, "Limit the velocity")
+    position_limited: bool = LIMITS.toggle(False, "Limit the position")
+    """Solve within q_min <= q <= q_max: d beyond where it starts and where it should end."""
+    position_margin: float = LIMITS.knob(
+        1.0, 0.05, 3.0, "d", "rad", "Position margin", step=0.05,
+        units={"system": {"mass": "m", "cart-pole": "m"}}, when={"position_limited": True},
+    )  # fmt: skip
+    """How far a joint may go beyond start and goal; of the cart-pole, the cart alone."""
+    speed_limited: bool = LIMITS.toggle(False, "Limit the velocity", when=MAY_LIMIT_SPEED)
     """Solve within |v| <= v_max, at every joint."""
     speed_limit: float = LIMITS.knob(
-        3.0, 0.5, 10.0, "v_{max}", "rad/s", "Velocity limit", step=0.1, when={"speed_limited": True}
+        3.0, 0.5, 10.0, "v_{max}", "rad/s", "Velocity limit", step=0.1, when=SPEED_LIMITED
     )
     """Most that a joint's velocity may be."""
     soft: bool = LIMITS.toggle(
-        False, "Soft limits", when=({"speed_limited": True}, {"system": "ur5", "obstacle": True})
+        False,
+        "Soft limits",
+        when=(*SPEED_LIMITED, {"position_limited": True}, {"system": "ur5", "obstacle": True}),
     )
-    """Velocities and obstacles may be passed a little, at a price, instead of never."""
+    """Positions, velocities and obstacles may be passed a little, at a price, not never."""
 
     goal: float = COST.knob(300.0, 1.0, 1e4, "w_f", "1/rad²", "Goal", scale="log", key=True)
     """Weight of the distance from the goal at the end: of the posture, or the UR5's tip."""
@@ -140,12 +165,15 @@ class PlanParams(Params):
     @property
     def problem(self) -> ContinuousProblem:
         """A new one."""
-        ball = self.ball
+        ball, far = self.ball, self.position_margin if self.position_limited else np.inf
+        q_lower, q_upper = self.task.position_limits(far)
         limits = MotionLimits(
-            velocity=self.speed_limit if self.speed_limited else np.inf,
+            q_lower,
+            q_upper,
+            velocity=self.speed_limit if self.acts("speed_limit") else np.inf,
             control=np.inf if self.bound is None else self.limit,
             obstacles=(ball,) if ball else (),
-            soft_weight=SOFT_WEIGHT if self.soft and (ball or self.speed_limited) else None,
+            soft_weight=SOFT_WEIGHT if self.soft and self.acts("soft") else None,
         )
         motion = continuous_motion(
             self.task.motion,

@@ -29,6 +29,8 @@ class DirectState(PlayerState):
 
     motion: Trajectory
     history: History
+    reusable: bool = False
+    """Whether a change may be solved from the motion: it is of a solve that did not fail."""
 
 
 S = TypeVar("S", bound=DirectState)

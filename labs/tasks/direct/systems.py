@@ -57,6 +57,16 @@ class System:
         driven = self.mechanism.driven
         return driven.index(self.shown) if self.shown in driven else 0
 
+    def position_limits(self, margin: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Least and greatest q (nq,) [rad; m]: so far beyond where it starts and its goal, at every
+        joint; of the cart-pole the rail's, for its pole has to swing."""
+        start = self.x0[: self.mechanism.nq]
+        goal = self.goal if len(self.goal) else start
+        free = np.array([self.motion == "cart-pole" and i > 0 for i in range(len(start))])
+        lower, upper = np.minimum(start, goal) - margin, np.maximum(start, goal) + margin
+        lower, upper = np.where(free, -np.inf, lower), np.where(free, np.inf, upper)
+        return tuple(lower.tolist()), tuple(upper.tolist())
+
     @property
     def camera(self) -> tuple[Vector3, Vector3]:
         return CAMERAS[self.motion]

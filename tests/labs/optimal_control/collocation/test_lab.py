@@ -50,6 +50,18 @@ def test_costates_see_limits_of_the_state() -> None:
     assert off.max() < 0.15
 
 
+WEAK: Settings = {"limited": True, "limit": 0.3, "horizon": 3.0, "guess": "controls"}
+
+
+def test_a_limited_position_is_kept_and_costs() -> None:
+    """A weak motor swings back first: less far than it would."""
+    free, held = solved(WEAK), solved({**WEAK, "position_limited": True, "position_margin": 1.5})
+    assert done(held).startswith("Converged"), done(held)
+    assert state(free).motion.X[:, 0].min() < -1.6
+    assert state(held).motion.X[:, 0].min() == pytest.approx(-1.5, abs=1e-8)
+    assert state(held).history.cost[-1] > state(free).history.cost[-1]
+
+
 def test_a_change_is_solved_from_the_present_solution() -> None:
     cold = solved({"horizon": 1.9, "start": "cold"})
     world = solved({})
@@ -57,6 +69,16 @@ def test_a_change_is_solved_from_the_present_solution() -> None:
     assert solve(world) < state(cold).history.iterations
     costs = [state(w).history.cost[-1] for w in (world, cold)]
     assert costs[0] == pytest.approx(costs[1], rel=1e-6)
+
+
+def test_a_solve_that_ran_out_of_iterations_goes_on() -> None:
+    world = solved({"iterations": 3.0})
+    assert state(world).failed
+    violation = state(world).history.violation[-1]
+    world.change({"iterations": 100.0})
+    solve(world)
+    assert done(world).startswith("Converged")
+    assert state(world).history.violation[0] == violation
 
 
 def test_a_large_matrix_is_shown_in_blocks() -> None:

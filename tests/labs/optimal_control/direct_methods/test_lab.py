@@ -5,12 +5,22 @@ import pytest
 
 from labs.algorithms import sqp
 from labs.algorithms.single_shooting import SingleShooting
+from labs.engine.catalog import find
+from labs.engine.run import World
 from labs.optimal_control.direct_methods.methods import METHODS, transcribe
 from labs.optimal_control.direct_methods.params import DirectMethodsParams
 from labs.optimal_control.direct_methods.race import verdict
 from labs.scene import NullScene
 from labs.tasks.direct.guesses import first_guess
-from tests.labs.optimal_control.direct_methods.simulation import Settings, race, solved, state
+from tests.labs.optimal_control.direct_methods.simulation import (
+    Settings,
+    costs,
+    iterations,
+    race,
+    solved,
+    state,
+)
+from tests.labs.solving import done, solve
 
 
 def test_the_race_changes_nothing_about_a_method() -> None:
@@ -63,6 +73,45 @@ def test_verdicts_name_who_failed_and_who_arrived() -> None:
     assert verdict(race({"system": "mass"})).startswith("All three converged.")
 
 
+@pytest.mark.parametrize(("system", "said"), [("cart-pole", "the pole's v"), ("ur5", "the tip's")])
+def test_all_methods_call_what_is_missed_the_same(system: str, said: str) -> None:
+    params = DirectMethodsParams(system=system, pieces=4.0)
+    methods = transcribe(params.problem, params.N, params.m, params.M).values()
+    found = set()
+    for method in methods:
+        equalities = len(method.program.values(method.variables(first_guess(params, params.N))).c)
+        found.add(method.program.equality_name(equalities - 1))
+    (name,) = found
+    assert name.startswith(said)
+    assert name.endswith("at the end")
+
+
+@pytest.mark.parametrize("system", ["double-pendulum", "ur5"])
+def test_the_greatest_final_speed_is_found_by_all(system: str) -> None:
+    """By the settings that the choice of the system brings."""
+    world = World(find("direct-methods"), {"objective": "fastest-end"})
+    world.change({"system": system})
+    solve(world)
+    assert done(world).startswith("All three converged")
+
+
+def test_a_solve_that_failed_is_begun_anew_and_one_that_ran_out_of_iterations_goes_on() -> None:
+    world = solved({"limited": True, "limit": 0.3, "horizon": 1.0})
+    assert "infeasible" in verdict(state(world).race)
+    world.change({"horizon": 2.0, "limited": False})
+    solve(world)
+    again, first = state(world).race, race({})
+    assert iterations(again) == iterations(first)
+    assert costs(again) == costs(first)
+    world = solved({"iterations": 3.0})
+    violation = state(world).race["collocation"].history.violation[-1]
+    world.change({"iterations": 100.0})
+    solve(world)
+    history = state(world).race["collocation"].history
+    assert history.violation[0] == pytest.approx(violation, rel=1e-6)
+    assert verdict(state(world).race).startswith("All three converged")
+
+
 def test_another_plan_is_played_without_solving_again() -> None:
     world = solved({})
     found = state(world).race
@@ -74,7 +123,7 @@ def test_another_plan_is_played_without_solving_again() -> None:
 
 
 def test_a_warm_start_is_quicker() -> None:
-    world = solved({"start": "warm"})
+    world = solved({})
     cold = state(world).race["single"].history.iterations
     world.change({"horizon": 2.1})
     while world.solving:

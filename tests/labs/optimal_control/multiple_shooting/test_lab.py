@@ -53,8 +53,8 @@ def test_the_plan_is_played_to_its_goal() -> None:
     assert state(world).missed[FEEDBACK] < 1e-4
 
 
-def test_a_change_starts_warm_where_it_is_wanted() -> None:
-    world = world_of(start="warm")
+def test_a_change_starts_warm() -> None:
+    world = world_of()
     solve(world)
     world.change({"segments": 20.0})
     solve(world)
@@ -85,5 +85,8 @@ def test_an_infeasible_limit_says_so_and_the_next_change_recovers() -> None:
     world.change({"limited": False})
     solve(world)
     assert done(world).startswith("Converged")
+    fresh = world_of()
+    solve(fresh)
+    assert done(world) == done(fresh), "from the first guess, not from what failed"
     assert not state(world).failed
     assert state(world).history.gaps[-1].max() == pytest.approx(0.0, abs=1e-7)

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from labs.engine.catalog import find
+from labs.engine.run import World
 from labs.optimal_control.single_shooting.lab import SingleShootingLab
 from labs.optimal_control.single_shooting.params import SingleShootingParams
 from labs.optimal_control.single_shooting.picture import STRIPS
@@ -42,6 +44,29 @@ def test_a_solve_that_stops_short_goes_on_warm() -> None:
     solve(world)
     assert done(world).startswith("Converged")
     assert state(world).history.cost[0] == pytest.approx(cost, rel=1e-12)
+
+
+def test_a_solve_that_failed_is_begun_anew() -> None:
+    world = solved({"limited": True, "limit": 0.2})
+    assert done(world).startswith("Infeasible")
+    world.change({"limited": False})
+    solve(world)
+    assert done(world) == done(solved({}))
+
+
+@pytest.mark.parametrize("objective", ["least-time", "least-energy", "fastest-end"])
+@pytest.mark.parametrize("system", ["double-pendulum", "ur5"])
+def test_a_system_that_is_chosen_brings_a_horizon_and_a_guess_that_work(
+    system: str, objective: str
+) -> None:
+    world = World(find("single-shooting"), {"objective": objective})
+    world.change({"system": system})
+    solve(world)
+    assert done(world).startswith("Converged")
+    world.change({"system": "mass"})
+    assert world.params == SingleShootingParams(system="mass", objective=objective)
+    world.change({"system": system, "horizon": 3.0})
+    assert params(world).horizon == 3.0
 
 
 @pytest.mark.parametrize("changes", [{"pieces": 30.0}, {"horizon": 2.1}, {"limited": True}])

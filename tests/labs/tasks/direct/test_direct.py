@@ -1,5 +1,7 @@
 """Motions in pieces, first guesses, and plans that are played."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from labs.tasks.direct.guesses import first_guess, resampled
 from labs.tasks.direct.history import ARC_POINTS, KEPT, History
 from labs.tasks.direct.params import GUESSES, DirectParams
 from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots, joined
+from labs.tasks.direct.plan_params import SOFT_WEIGHT
 from labs.tasks.direct.player import DirectState, advanced, dragged, measured, replayed
 from labs.tasks.direct.systems import TITLES, reaching_posture, system
 from labs.tasks.direct.tracking import playable
@@ -164,6 +167,33 @@ def test_a_plan_is_played_and_the_regulator_holds_it() -> None:
     assert state.missed[OPEN_LOOP] < 0.2, "the errors of 40 steps, grown near the unstable end"
     again = resampled(params, state.motion, 20)
     np.testing.assert_allclose(again.X, state.motion.X[::2], atol=1e-12)
+
+
+def test_positions_are_limited_beyond_start_and_goal() -> None:
+    def limits(system: str, **more: Any) -> tuple[np.ndarray, np.ndarray]:
+        problem = DirectParams(system=system, position_limited=True, **more).problem
+        n = problem.dynamics.nx // 2
+        return problem.x_lower[:n], problem.x_upper[:n]
+
+    np.testing.assert_allclose(limits("pendulum", position_margin=0.3), [[-0.3], [np.pi + 0.3]])
+    np.testing.assert_allclose(limits("cart-pole"), [[-1.0, -np.inf], [1.0, np.inf]])
+    home = mechanism("ur5").arm.home
+    np.testing.assert_allclose(limits("ur5", position_margin=1.0), [home - 1.0, home + 1.0])
+    assert np.isinf(limits("ur5", soft=True)).all()
+    soft = DirectParams(position_limited=True, soft=True).problem
+    x, u = np.array([[-1.1, 0.0], [0.0, 0.0]]), np.zeros((2, 1))
+    beyond, within = soft.cost.running(x, u)
+    assert beyond - within == pytest.approx(SOFT_WEIGHT * 0.1**2)
+    assert np.isinf(DirectParams().problem.x_lower).all()
+
+
+@pytest.mark.parametrize("system", TITLES)
+def test_velocities_that_run_away_are_limited(system: str) -> None:
+    params = DirectParams(system=system, objective="fastest-end")
+    limited = system in ("double-pendulum", "ur5")
+    assert params.acts("speed_limit") == limited != params.acts("speed_limited")
+    n = params.task.mechanism.nq
+    np.testing.assert_array_equal(params.problem.x_upper[n:], 3.0 if limited else np.inf)
 
 
 def test_balls_are_dragged() -> None:

@@ -116,6 +116,8 @@ class Session:
     def _unavailable(self) -> Unavailable:
         if self.state == "failed":
             return Unavailable("this session has ended after repeated crashes: open the lab anew")
+        if self.worker and not self.worker.gone:
+            return Unavailable("the simulation is busy and does not answer: try again in a moment")
         return Unavailable("the simulation is being restarted: try again in a moment")
 
     # Viewers ------------------------------------------------------------------------------------

@@ -19,6 +19,7 @@ from server.problems import describe
 from server.session import Session
 from server.sessions import NoSession, Sessions
 from server.viewers import Viewer
+from server.waking_clock import WakingClock
 
 SEND_SECONDS = 20.0
 """A viewer that takes this long for one message has left."""
@@ -112,8 +113,10 @@ async def answer_request(session: Session, text: str) -> Answer:
 
 
 async def _send(socket: WebSocket, viewer: Viewer) -> None:
+    clock: WakingClock = socket.app.state.supervisor.clock
     with contextlib.suppress(WebSocketDisconnect, RuntimeError, TimeoutError):
         async for payload in viewer.messages():
-            await asyncio.wait_for(socket.send_text(payload.decode()), SEND_SECONDS)
+            async with clock.timeout(SEND_SECONDS):
+                await socket.send_text(payload.decode())
     with contextlib.suppress(WebSocketDisconnect, RuntimeError):
         await socket.close(ENDED)

@@ -5,17 +5,16 @@ import contextlib
 import logging
 import signal
 import socket
-import threading
 from collections.abc import Callable
-from multiprocessing.process import BaseProcess
 from typing import Any
 
 import orjson
 
 from labs.errors import LabError
-from server import fork_server, worker_entry
+from server import fork_server
 from server.pipe import CONTROL, HEADER, encode, frame
 from server.settings import Settings
+from server.starting import start_worker
 from server.tasks import Tasks
 from server.waking_clock import WakingClock
 
@@ -23,9 +22,9 @@ log = logging.getLogger("orclab.supervisor")
 
 REQUEST_SECONDS = 10.0
 SPAWN_SECONDS = 60.0
+"""Until a process that has begun is ready."""
 RETRY_SECONDS = 1.0
 """Until a spare is tried again that could not be had."""
-REFUSALS, REFUSAL_SECONDS = 10, 0.5
 
 Frames = Callable[[int, bytes], None]
 Gone = Callable[[str], None]
@@ -58,7 +57,8 @@ class Worker:
         """Waits until the worker has said that it is ready."""
         self._reader, self._writer = await asyncio.open_connection(sock=self._socket)
         self._listening = asyncio.create_task(self._listen())
-        self.port = await asyncio.wait_for(self._ready, SPAWN_SECONDS)
+        async with self._clock.timeout(SPAWN_SECONDS):
+            self.port = await self._ready
 
     def send(self, do: str, **arguments: Any) -> None:
         """Says what to do; expects no answer."""
@@ -103,7 +103,8 @@ class Worker:
 
     async def _await(self, reference: int) -> Any:
         try:
-            return await asyncio.wait_for(self._answers[reference], REQUEST_SECONDS)
+            async with self._clock.timeout(REQUEST_SECONDS):
+                return await self._answers[reference]
         except TimeoutError:
             raise WorkerGone("the simulation does not answer") from None
         finally:
@@ -129,7 +130,7 @@ class Worker:
             self._finish(_describe_exit(self.process.exitcode))
 
     def _control(self, message: dict[str, Any]) -> None:
-        if message.get("ready"):
+        if message.get("ready") and not self._ready.done():
             self._ready.set_result(message["port"])
         answer = self._answers.get(message.get("ref", 0))
         if answer and not answer.done():
@@ -201,44 +202,20 @@ class Supervisor:
 
     async def _spawn(self) -> Worker:
         try:
-            worker = await self._start()
+            process, ours = await start_worker(self._context, self.clock)
         except (EOFError, OSError, RuntimeError) as error:
             why = getattr(error, "strerror", None) or repr(error)
             raise WorkerGone(f"no process could be started: {why}") from None
+        worker = Worker(process, ours, self.clock)
         self._workers.add(worker)
         try:
             await worker.wait_until_ready()
-        except (WorkerGone, TimeoutError, OSError) as error:
+        except (WorkerGone, OSError) as error:  # of which TimeoutError is one
+            why = str(error) or f"it was not ready within {SPAWN_SECONDS:g} s"
             await self.release(worker, "it did not start")
-            raise WorkerGone(f"a worker did not start: {error}") from None
+            raise WorkerGone(f"a worker did not start: {why}") from None
         self.preparing = False
         return worker
-
-    async def _start(self) -> Worker:
-        """A process that begins. Raises OSError (of descriptors, processes), EOFError."""
-        ours, theirs = socket.socketpair()
-        try:
-            process = self._context.Process(
-                target=worker_entry.main, args=(theirs,), daemon=True, name="orclab-worker"
-            )
-            # The first waits here until the fork server has prepared what all workers share. That
-            # may take a minute, where solvers are to be compiled; nobody is late yet.
-            await self._begin(process)
-        except BaseException:
-            ours.close()
-            raise
-        finally:
-            theirs.close()
-        return Worker(process, ours, self.clock)
-
-    async def _begin(self, process: BaseProcess) -> None:
-        """A fork server that was killed refuses requests until it is gone; then `start` begins
-        another."""
-        for _ in range(REFUSALS):
-            with contextlib.suppress(ConnectionError, EOFError):
-                return await _on_a_thread(process.start)
-            await asyncio.sleep(REFUSAL_SECONDS)
-        await _on_a_thread(process.start)
 
     async def _fill(self) -> None:
         async with self._filling:
@@ -265,32 +242,6 @@ class Supervisor:
                     seconds = self._settings.hang_seconds
                     reason = f"it stopped answering for {seconds:g} s and was ended"
                     self._tasks.spawn(self.release(worker, reason))
-
-
-async def _on_a_thread(work: Callable[[], None]) -> None:
-    """As `asyncio.to_thread`, but the end of the server does not wait for it."""
-    loop = asyncio.get_running_loop()
-    done: asyncio.Future[None] = loop.create_future()
-
-    def finish(error: BaseException | None) -> None:
-        if done.done():
-            return
-        if error:
-            done.set_exception(error)
-        else:
-            done.set_result(None)
-
-    def run() -> None:
-        error: BaseException | None = None
-        try:
-            work()
-        except BaseException as problem:
-            error = problem
-        with contextlib.suppress(RuntimeError):  # the loop has ended: nobody waits any more
-            loop.call_soon_threadsafe(finish, error)
-
-    threading.Thread(target=run, daemon=True).start()
-    await done
 
 
 def _describe_exit(exitcode: int | None) -> str:

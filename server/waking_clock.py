@@ -1,6 +1,8 @@
 """Time as this process lived through it."""
 
 import asyncio
+import contextlib
+from collections.abc import AsyncIterator
 
 TICK = 0.25
 """[s] Between two ticks."""
@@ -16,6 +18,17 @@ class WakingClock:
         self.now = 0.0
         """[s]"""
         self._last = asyncio.get_running_loop().time()
+        self._ends: dict[asyncio.Timeout, float] = {}
+
+    @contextlib.asynccontextmanager
+    async def timeout(self, seconds: float) -> AsyncIterator[None]:
+        """As `asyncio.timeout`, by this clock."""
+        async with asyncio.timeout(None) as limit:
+            self._ends[limit] = self.now + seconds
+            try:
+                yield
+            finally:
+                self._ends.pop(limit, None)
 
     async def tick(self) -> None:
         """Waits for the next tick, and counts it."""
@@ -23,3 +36,6 @@ class WakingClock:
         time = asyncio.get_running_loop().time()
         self.now += min(time - self._last, LONGEST)
         self._last = time
+        for limit in [limit for limit, end in self._ends.items() if end <= self.now]:
+            del self._ends[limit]
+            limit.reschedule(time)

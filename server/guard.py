@@ -12,6 +12,7 @@ from server.settings import Settings
 
 LOOPBACK = {"127.0.0.1", "localhost", "::1"}
 SAFE = {"GET", "HEAD", "OPTIONS"}
+BEGINNINGS = ("http.response.start", "websocket.accept", "websocket.http.response.start")
 HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "same-origin",
@@ -40,12 +41,10 @@ class Guard:
             return
         headers = {k.decode("latin-1"): v.decode("latin-1") for k, v in scope["headers"]}
         refusal = self._refusal(scope, headers)
-        sending = _with_headers(send)
+        sending = _answering(scope, receive, send)
         if refusal is None:
             inside = self._inside(scope)
             await self._app(inside, _bounded(receive, self._limit(inside)), sending)
-        elif scope["type"] == "websocket":
-            await send({"type": "websocket.close", "code": 1008, "reason": refusal[1][:120]})
         else:
             status, sentence, code = refusal
             response = JSONResponse({"error": sentence, "code": code}, status)
@@ -92,12 +91,23 @@ class Guard:
             return False
 
 
-def _with_headers(send: Send) -> Send:
+def _answering(scope: Scope, receive: Receive, send: Send) -> Send:
+    """Sends with our headers, and says why a WebSocket is closed that was not yet open."""
+    is_open = scope["type"] != "websocket"
+
     async def sending(message: Message) -> None:
-        if message["type"] == "http.response.start":
-            headers = MutableHeaders(scope=message)
+        nonlocal is_open
+        if message["type"] == "websocket.close" and not is_open:
+            why = message.get("reason") or "there is no WebSocket at this address"
+            refusal = JSONResponse({"error": why, "code": "no-websocket"}, 403)
+            await refusal(scope, receive, sending)
+            return
+        if message["type"] in BEGINNINGS:
+            is_open = True
+            headers = MutableHeaders(scope={"headers": message.get("headers", [])})
             for name, value in HEADERS.items():
                 headers.setdefault(name, value)
+            message = {**message, "headers": headers.raw}
         await send(message)
 
     return sending

@@ -6,6 +6,8 @@ from typing import Any
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from server.guard import HEADERS
+
 REQUEST_SECONDS = 30.0
 """From a request's first byte to its last: a student's upload over a slow network takes less."""
 
@@ -52,9 +54,11 @@ class HttpProtocol(H11Protocol):
             cycle.disconnected = True
             cycle.message_event.set()
         if self.conn.our_state in (h11.IDLE, h11.SEND_RESPONSE):
-            super().send_400_response(msg)
-        else:
-            self.transport.close()
+            headers = [("Content-Type", "text/plain; charset=utf-8"), ("Connection", "close")]
+            response = h11.Response(status_code=400, headers=[*headers, *HEADERS.items()])
+            for part in (response, h11.Data(data=msg.encode()), h11.EndOfMessage()):
+                self.transport.write(self.conn.send(part))
+        self.transport.close()
 
     def _await_request(self) -> None:
         if not (self._deadline or self._upgraded or self.transport.is_closing()):

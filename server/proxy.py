@@ -23,6 +23,7 @@ from server.sessions import NoSession, Sessions
 router = APIRouter(include_in_schema=False)
 
 GONE, TRY_AGAIN = 4404, 1013
+RESTARTING = "the scene is being restarted: try again in a moment"
 CLOSE_SECONDS = 0.5
 """A worker, which may be busy or gone, is not waited for longer: nobody is at that end."""
 OURS = (
@@ -88,8 +89,11 @@ async def scene_socket(socket: WebSocket, session_id: str) -> None:
         await socket.accept(offered[0] if offered else None)
         await socket.close(GONE, str(error)[:120])
         return
-    if worker is None or worker.gone or not offered:
-        await socket.close(TRY_AGAIN)
+    if not offered:
+        await socket.close(TRY_AGAIN, "a scene speaks Viser's protocol alone: open its page")
+        return
+    if worker is None or worker.gone:
+        await socket.close(TRY_AGAIN, RESTARTING)
         return
     try:
         async with connect(
@@ -106,7 +110,7 @@ async def scene_socket(socket: WebSocket, session_id: str) -> None:
             await _relay(socket, upstream)
     except (OSError, websockets.InvalidHandshake):
         with contextlib.suppress(WebSocketDisconnect):  # the browser may have left as well
-            await socket.close(TRY_AGAIN)
+            await socket.close(TRY_AGAIN, RESTARTING)
     except asyncio.CancelledError:
         pass  # The server stops and waits no longer; what was open is closed.
 

@@ -16,6 +16,7 @@ from labs.errors import LabError
 from server import fork_server
 from server.http_protocol import HttpProtocol
 from server.settings import Settings
+from server.websocket_protocol import WebSocketProtocol
 
 MAX_MESSAGE = 2**20
 """[bytes] Of a WebSocket's message from a browser, whose slider or camera was moved."""
@@ -39,7 +40,7 @@ def serve(options: argparse.Namespace) -> int:
         app,
         loop="uvloop",
         http=HttpProtocol,
-        ws="websockets-sansio",
+        ws=WebSocketProtocol,
         ws_max_size=MAX_MESSAGE,
         ws_per_message_deflate=False,
         log_level="warning",

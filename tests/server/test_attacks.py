@@ -62,6 +62,7 @@ def test_an_origin_that_is_none_is_refused(served: Served, origin: str) -> None:
     with pytest.raises(InvalidStatus) as refused:
         connect(f"{served.address.replace('http', 'ws')}/api/sessions/x/stream", origin=origin)  # type: ignore[arg-type]
     assert refused.value.response.status_code == 403
+    assert "ORCLAB_ORIGINS" in json.loads(refused.value.response.body or b"")["error"]
 
 
 @pytest.mark.parametrize("length", ["\u00b2", "9" * 5000, "-1", "1e3", "0x10", ""])
@@ -91,6 +92,39 @@ def test_every_answer_is_guarded_and_head_is_get_without_its_body(served: Served
     answer = served.http.request("TRACE", "/")
     assert answer.status_code == 405
     assert answer.headers["x-content-type-options"] == "nosniff"
+
+
+def test_so_is_what_no_application_answered(mortal: Served) -> None:
+    """No HTTP, no handshake, no WebSocket there, or none for whom asks; and each says why."""
+    key = "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ=="
+    before = length_of_stderr(mortal)
+    with mortal.session("oscillator") as session:
+        scene, stream = session.info["scene"].rstrip("/"), session.info["stream"]
+        handshakes = {
+            "sec-websocket-key": (stream, "Sec-WebSocket-Key: short", "GET", 400),
+            "line too long": (stream, f"{key}\r\nX: {'x' * 10_000}", "GET", 400),
+            "method": (stream, key, "POST", 400),
+            "ORCLAB_ORIGINS": (stream, f"{key}\r\nOrigin: http://evil.example", "GET", 403),
+            "at this address": ("/none", key, "GET", 403),
+            "open its page": (scene, key, "GET", 403),
+        }
+        answers = {"Invalid HTTP": (speak(mortal, b"no HTTP at all\r\n\r\n"), 400)}
+        for why, (path, more, method, status) in handshakes.items():
+            hello = (
+                f"{method} {path} HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\n"
+                f"Connection: Upgrade\r\nSec-WebSocket-Version: 13\r\n{more}\r\n\r\n"
+            )
+            answers[why] = speak(mortal, hello.encode(), close=False), status
+    for why, (answer, status) in answers.items():
+        head, _, body = answer.decode().partition("\r\n\r\n")
+        assert head.startswith(f"HTTP/1.1 {status} "), (why, head)
+        assert why.lower() in body.lower(), (why, body)
+        for header in ("x-content-type-options: nosniff", "referrer-policy: same-origin"):
+            assert header in head.lower(), why
+        assert "frame-ancestors 'self'" in head, why
+    complaints = said(mortal, before)
+    assert "ERROR" not in complaints, complaints
+    assert "Traceback" not in complaints, complaints
 
 
 def test_what_a_peer_breaks_off_is_told_in_a_line(mortal: Served) -> None:

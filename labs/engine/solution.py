@@ -22,7 +22,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from labs.engine.array_files import from_json, from_npz, to_json
+from labs.engine.array_files import from_json, from_npz, parse_json, to_json
 from labs.engine.record import versions
 from labs.engine.snapshots import flatten
 from labs.errors import LabError
@@ -117,11 +117,9 @@ class Solution:
         try:
             if data.startswith(b"PK"):
                 arrays = from_npz(data, without=RESULTS)
-                about = json.loads(str(arrays.pop("about")))
+                about = parse_json(str(arrays.pop("about")).encode())
                 return cls._checked(about, arrays)
-            import orjson  # on demand, as for writing
-
-            return cls.from_dict(orjson.loads(data))
+            return cls.from_dict(parse_json(data))
         except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError) as error:
             raise LabError(f"this is no solution saved by orclab ({_brief(error)})") from None
         except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError) as error:

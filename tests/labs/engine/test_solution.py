@@ -2,6 +2,7 @@
 
 import io
 import json
+import tracemalloc
 import zipfile
 from dataclasses import dataclass, replace
 from typing import Any
@@ -238,6 +239,11 @@ UNREADABLE = {
     "letters that are none": packed(about=npy(np.array("{}"))[:-8] + b"\xff\xff\xff\x7f" * 2),
     "half a letter": packed(about=npy(np.array("{}"))[:-8] + b"\x00\xd8\x00\x00" * 2),
     "deep about": packed(about=npy(np.array("[" * 100_000))),
+    "many lists": plain(unknown=[[]] * 20_000),
+    "many objects": plain(unknown=[{}] * 20_001),
+    "many texts": plain(unknown=[""] * 50_001),
+    "many numbers": plain(unknown=[0]).replace(b"[0]", b"[" + b"0," * 2**22 + b"0]"),
+    "many lists in about": packed(about=npy(np.array("[" + "[]," * 20_000 + "0]"))),
     "many": packed(zipfile.ZIP_STORED, **{f"x{k}": b"" for k in range(MAX_ARRAYS + 1)}),
 }
 
@@ -254,6 +260,18 @@ def test_a_recording_is_named_as_one(form: str) -> None:
     recording = run("descent", seconds=0.1).recording().write(form)
     with pytest.raises(LabError, match=r"this is a recording .*, not a solution"):
         Solution.read(recording)
+
+
+def test_what_json_holds_is_counted_before_it_is_built() -> None:
+    """As large a file as is taken, of nested lists, would take 50 times its size, and seconds."""
+    content = plain().replace(b"{", b'{"x": [' + b"[[[[[]]]]]," * (2**24 // 11 - 400) + b"0], ", 1)
+    assert 0.99 * 2**24 < len(content) < 2**24
+    tracemalloc.start()
+    with pytest.raises(LabError, match=r"more than 20000 of the sign \["):
+        Solution.read(content)
+    used = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert used < 1e6
 
 
 def test_a_file_that_unpacks_to_too_much_is_not_unpacked() -> None:

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from labs.engine.catalog import catalog, find
 from labs.engine.events import events_of
+from labs.engine.links import LARGEST_SEED, read_link
 from labs.engine.run import World
 from labs.engine.solution import Solution
 from labs.errors import LabError
@@ -75,12 +76,20 @@ def test_a_text_is_taken_or_refused(slug: str, name: str) -> None:
 @sometimes
 @given(data=st.data())
 def test_a_link_is_taken_or_refused(data: st.DataObject) -> None:
+    """All of it by a command line; by a page each part for itself."""
     slug = data.draw(st.sampled_from(list(catalog())))
     P: type[Params] = find(slug).lab.Params
-    names = st.one_of(st.sampled_from(list(P.tunables)), st.text(max_size=20))
+    names = st.one_of(st.sampled_from(["seed", *P.tunables]), st.text(max_size=20))
     values = st.one_of(SPLINTERS, LETTERS, st.text(max_size=40), st.floats().map(str))
     texts = data.draw(st.dictionaries(names, values, max_size=4))
-    taken(lambda: P().change(P.read(texts)))
+    whole = taken(lambda: P().change(P.read(texts)))
+    params, seed, remarks = read_link(P(), texts)
+    assert params == P.model_validate(params.model_dump())
+    assert seed is None or 0 <= seed <= LARGEST_SEED
+    assert len(remarks) <= len(texts), "one on each part at most"
+    assert all(len(remark) < LONGEST_ERROR for remark in remarks)
+    if whole:
+        assert (params, seed, remarks) == (P().change(P.read(texts)), None, [])
 
 
 def found(slug: str) -> Solution:

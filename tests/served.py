@@ -30,11 +30,12 @@ class Served:
     ) -> None:
         """`wait`: until a spare is warm. `stderr`: where its complaints go."""
         self._environment = os.environ | {"ORCLAB_LABS": "tests.sample_labs"} | environment
-        self._port, self.stderr = port, stderr
+        self._port, self.stderr, self.starts = port, stderr, 0
         self.start(wait)
 
     def start(self, wait: bool = True) -> None:
         """Starts, and waits until it answers and a spare is warm."""
+        self.starts += 1
         self.process = subprocess.Popen(
             [sys.executable, "-m", "server", "--port", str(self._port)],
             env=self._environment,

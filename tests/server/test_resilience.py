@@ -165,6 +165,10 @@ def test_no_process_survives_the_server(mortal: Served, how: signal.Signals) -> 
     server.http.patch(path, json={"fault": "hang"})
     server.stop(how)
     assert not psutil.wait_procs(below, timeout=10)[1], "these survived"
+    assert server.process.stdout is not None
+    printed = server.process.stdout.read()
+    if server.starts > 1:  # of these cases the second at the latest
+        assert printed == "", "all was compiled before"
 
 
 def test_the_first_start_may_take_its_time(tmp_path: Path) -> None:

@@ -31,7 +31,11 @@ def inlined(function: F) -> F:
 
 def _compiled(function: F, inline: bool) -> F:
     machine_code = numba.njit(
-        cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, forceinline=inline
+        cache=KEPT is not None,
+        nogil=True,
+        error_model="numpy",
+        fastmath={"contract"},
+        forceinline=inline,
     )
     return cast(F, machine_code(function))
 
@@ -79,20 +83,23 @@ def on_compilation(tell: Callable[[], None]) -> Iterator[None]:
         yield
 
 
-def cache_folder(package: Path, digest: str) -> str:
+def cache_folder(package: Path, digest: str) -> str | None:
     """Where Numba may keep what it compiles: "" beside the source, as usual, or where that cannot
-    be written, as by one who did not install it, a folder of this user's own."""
+    be written, as by one who did not install it, a folder of this user's own. None: nowhere."""
     beside = (package, *package.rglob("__pycache__"))
     if all(os.access(path, os.W_OK) for path in beside):
         return ""
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    for parent in (home, tempfile.gettempdir()):
-        folder = Path(parent) / f"numba-orclab-{os.getuid()}" / digest
-        with contextlib.suppress(OSError):
+    for find_parent in (lambda: home, tempfile.gettempdir):
+        with contextlib.suppress(OSError):  # where there is no temporary folder either
+            parent = Path(find_parent())
+            folder = parent / f"numba-orclab-{os.getuid()}" / digest
+            if not parent.is_absolute():
+                continue  # "~": nobody knows where this user's home is
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             if _is_own(folder.parent) and _is_own(folder):
                 return str(folder)
-    return tempfile.mkdtemp(prefix="numba-orclab-")
+    return None
 
 
 def _is_own(folder: Path) -> bool:
@@ -102,15 +109,38 @@ def _is_own(folder: Path) -> bool:
     return safe and not folder.is_symlink() and os.access(folder, os.W_OK)
 
 
-def _prepare_cache(package: Path) -> None:
-    if os.environ.get("NUMBA_CACHE_DIR"):
-        return  # somebody chose a place
+def _is_writable(folder: Path) -> bool:
+    with contextlib.suppress(OSError):
+        folder.mkdir(parents=True, exist_ok=True)
+    return os.access(folder, os.W_OK)
+
+
+def _prepare_cache(package: Path) -> str | None:
+    if (chosen := os.environ.get("NUMBA_CACHE_DIR")) and _is_writable(Path(chosen)):
+        return ""
     digest = source_digest(package)
-    if folder := cache_folder(package, digest[:16]):
+    folder = cache_folder(package, digest[:16])
+    if folder:
         os.environ["NUMBA_CACHE_DIR"] = folder
         config.reload_config()  # type: ignore[no-untyped-call]
-    else:
+    elif folder == "":
         forget_stale(package, digest)
+    return folder
 
 
-_prepare_cache(Path(__file__).parent)
+def cache_note(folder: str | None) -> str:
+    """What somebody should know of the cache, in a sentence; nothing where it is as usual, or was
+    used before."""
+    if folder is None:
+        return (
+            "What is compiled is kept nowhere, for no folder can be written: each start compiles "
+            "again. NUMBA_CACHE_DIR or TMPDIR may name one that can."
+        )
+    if folder and not any(Path(folder).iterdir()):
+        return f"What is compiled is kept in {folder}, for the labs' own folder cannot be written."
+    return ""
+
+
+KEPT = _prepare_cache(Path(__file__).parent)
+"""As `cache_folder` says."""
+NOTE = cache_note(KEPT)

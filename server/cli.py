@@ -120,6 +120,10 @@ def _run(options: argparse.Namespace) -> int:
     plan = _arguments_of_recording(options) if options.replay else _arguments_of_options(options)
     if options.seconds is not None:
         plan["seconds"] = options.seconds
+    from labs.compiled import NOTE  # on demand: help needs no Numba
+
+    if NOTE:
+        print(NOTE, file=sys.stderr)
     world = run(**plan, progress=_progress if sys.stderr.isatty() else None)
     for option, path, write in outputs:
         try:

@@ -6,7 +6,7 @@ import sys
 import threading
 
 import server.worker  # noqa: F401  (imports Viser, Pinocchio and all labs' code)
-from labs.compiled import on_compilation
+from labs import compiled
 from labs.engine.catalog import Entry, catalog
 from labs.errors import LabError
 from labs.models.arms import ARMS, load
@@ -31,11 +31,13 @@ def _watch(parent: int, compiling: threading.Event, over: threading.Event) -> No
 
 def _prepare() -> None:
     """Compiled code is kept on disk: a second start finds it."""
+    if compiled.NOTE:
+        print(compiled.NOTE, flush=True)
     compiling, over = threading.Event(), threading.Event()
     waiting = threading.Thread(target=_watch, args=(os.getppid(), compiling, over))
     waiting.start()
     try:
-        with on_compilation(compiling.set):
+        with compiled.on_compilation(compiling.set):
             for entry in _entries():
                 entry.lab.prepare()
     finally:

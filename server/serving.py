@@ -5,6 +5,7 @@ import asyncio
 import ipaddress
 import logging
 import socket
+import tempfile
 
 import h11
 import uvicorn
@@ -30,6 +31,13 @@ def serve(options: argparse.Namespace) -> int:
         settings = Settings(**given)
     except (ValidationError, SettingsError) as error:
         raise LabError(_wrong_settings(error)) from None
+    try:
+        tempfile.gettempdir()
+    except FileNotFoundError:
+        raise LabError(
+            "serving needs a folder for temporary files, and none can be written: TMPDIR may name "
+            "one, such as /dev/shm"
+        ) from None
     listener = _listen(settings.host, settings.port)
     fork_server.start()
     from server.app import create_app  # loads all labs, beside the fork server

@@ -116,16 +116,23 @@ from labs.probe import twice
 from server.cli import main
 
 assert main(["list"]) == 0
+assert main(["run", "joint-control", "--seconds", "0.01"]) == 0
 result = twice(2)
 from numba.core import config
-kept = [path.name for path in Path(config.CACHE_DIR).rglob("probe.twice*")]
+kept = [path.name for path in Path(config.CACHE_DIR or "/none").rglob("probe.twice*")]
 print(json.dumps({"result": result, "folder": config.CACHE_DIR, "kept": kept}))
+"""
+WITHOUT_ANY_FOLDER = f"""
+import tempfile
+tempfile._candidate_tempdir_list = lambda: ["/proc/none"]
+{WITHOUT_A_HOME}
+assert main(["serve", "--port", "0"]) == 2
 """
 
 
 def test_where_nothing_may_be_written_everything_works() -> None:
     """Installed by somebody else, and used by one without a home: what is compiled is kept in a
-    temporary folder of this user's own."""
+    temporary folder of this user's own, or nowhere, and a sentence says which, once."""
     with tempfile.TemporaryDirectory() as name:
         place = Path(name)
         for package in ("labs", "server"):
@@ -138,23 +145,32 @@ def test_where_nothing_may_be_written_everything_works() -> None:
             path.chmod(0o555 if path.is_dir() else 0o444)
         temporary.chmod(0o777)
         environment = {k: v for k, v in os.environ.items() if k not in ("HOME", "ORCLAB_LABS")}
-        result = subprocess.run(
-            [sys.executable, "-c", AS_NOBODY, WITHOUT_A_HOME],
-            check=False,
-            cwd=place,
-            env=environment | {"TMPDIR": str(temporary), "XDG_CACHE_HOME": "/proc/none"},
-            capture_output=True,
-            text=True,
+        first, second, nowhere = (
+            subprocess.run(
+                [sys.executable, "-c", AS_NOBODY, script],
+                check=False,
+                cwd=place,
+                env=environment | {"TMPDIR": str(temporary), "XDG_CACHE_HOME": "/proc/none"},
+                capture_output=True,
+                text=True,
+            )
+            for script in (WITHOUT_A_HOME, WITHOUT_A_HOME, WITHOUT_ANY_FOLDER)
         )
         for path in (place, *place.rglob("*")):
             path.chmod(0o755)
-    assert result.returncode == 0, result.stderr
-    *listed, last = result.stdout.splitlines()
-    assert len(listed) > 10
-    found = json.loads(last)
-    assert found["result"] == 4
-    assert found["folder"].startswith(str(temporary))
-    assert found["kept"]
+    for result in (first, second, nowhere):
+        assert result.returncode == 0, result.stderr
+        *listed, last = result.stdout.splitlines()
+        assert len(listed) > 10
+        found = json.loads(last)
+        assert found["result"] == 4
+        assert bool(found["kept"]) == (result is not nowhere)
+        if result is not nowhere:
+            assert found["folder"].startswith(str(temporary))
+    assert f"kept in {temporary}" in first.stderr
+    assert "kept" not in second.stderr
+    assert nowhere.stderr.count("is kept nowhere") == 1
+    assert "TMPDIR" in nowhere.stderr.splitlines()[-1], "serving needs one"
 
 
 def test_a_folder_of_somebody_else_holds_no_code(

@@ -90,12 +90,12 @@ def cache_folder(package: Path, digest: str) -> str | None:
     if all(os.access(path, os.W_OK) for path in beside):
         return ""
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    for find_parent in (lambda: home, tempfile.gettempdir):
-        with contextlib.suppress(OSError):  # where there is no temporary folder either
-            parent = Path(find_parent())
-            folder = parent / f"numba-orclab-{os.getuid()}" / digest
-            if not parent.is_absolute():
-                continue  # "~": nobody knows where this user's home is
+    parents = [home] if os.path.isabs(home) else []  # "~": nobody knows where it is
+    with contextlib.suppress(FileNotFoundError):
+        parents.append(tempfile.gettempdir())
+    for parent in parents:
+        folder = Path(parent) / f"numba-orclab-{os.getuid()}" / digest
+        with contextlib.suppress(OSError):
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             if _is_own(folder.parent) and _is_own(folder):
                 return str(folder)

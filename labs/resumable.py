@@ -3,7 +3,7 @@
 A long computation is written as a generator that yields where it may pause and returns its
 result; one calls another by `yield from`."""
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from time import perf_counter
 from typing import TypeVar
 
@@ -11,6 +11,8 @@ T = TypeVar("T")
 
 Resumable = Generator[None, None, T]
 """Pauses at every `yield`; its result is what it returns."""
+PIECE = 5e6
+"""Operations between two pauses."""
 
 
 def run_to_completion(work: Resumable[T]) -> T:
@@ -21,6 +23,14 @@ def run_to_completion(work: Resumable[T]) -> T:
         except StopIteration as end:
             result: T = end.value
             return result
+
+
+def pieces(many: int, work: float) -> Iterator[int]:
+    """How many to do before each pause, of so many equal things of `work` operations each: about
+    PIECE of these, some milliseconds where one takes a nanosecond."""
+    share = max(1, int(PIECE / work))
+    for begun in range(0, many, share):
+        yield min(share, many - begun)
 
 
 def timed(work: Resumable[T], seconds: dict[str, float], phase: str) -> Resumable[T]:

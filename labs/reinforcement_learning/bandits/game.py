@@ -19,6 +19,7 @@ A game is a mapping of arrays, P strategies on M tasks of K doors each, after t 
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -26,10 +27,13 @@ from labs.algorithms.bandits import Bandits, Players, gaussian_testbed, init, st
 from labs.algorithms.exploration import BehaviourPolicy
 from labs.problems.episodes import UpdateRule
 from labs.reinforcement_learning.bandits.params import TASKS, BanditParams
+from labs.resumable import Resumable, pieces
 
 Game = Mapping[str, np.ndarray]
 GREEDY, NO_LEARNING = BehaviourPolicy(epsilon=0.0), UpdateRule(alpha=0.0)
 """In the test."""
+COST = 20
+"""Operations for a door of a task at each turn, at most about."""
 _CARRIED = ("q", "visits", "means", "largest", "regret")
 
 
@@ -71,25 +75,30 @@ def alone(params: BanditParams, game: Game, m: int) -> Game:
     return restart(params, {name: game[name][m : m + 1] for name in ("begun", "luck")})
 
 
-def play(params: BanditParams, game: Game, turns: int) -> Game:
+def play(params: BanditParams, game: Game, turns: int) -> Resumable[Game]:
     """The game after so many further turns of all."""
     lessons = min(max(params.lessons - game["regrets"].shape[1], 0), turns)
     for many, test in ((lessons, False), (turns - lessons, True)):
-        game = _play(params, game, many, test) if many else game
+        if many:
+            game = yield from _play(params, game, many, test)
     return game
 
 
-def _play(params: BanditParams, game: Game, turns: int, test: bool) -> Game:
+def _play(params: BanditParams, game: Game, turns: int, test: bool) -> Resumable[Game]:
     bandits, rule = bandits_of(params, game["begun"]), NO_LEARNING if test else params.rule
     after = []
     for p, strategy in enumerate(params.strategies):
         measured = params.measured and strategy == "bound" and not test
         behaviour = GREEDY if test else params.behaviour(strategy)
-        after.append(step(bandits, behaviour, rule, _players(game, p), turns, measured))
+        one, regrets, best = _players(game, p), [], []
+        for some in pieces(turns, COST * game["begun"].size):
+            one = step(bandits, behaviour, rule, one, some, measured)
+            regrets.append(one.regrets)
+            best.append(one.best)
+            yield
+        after.append(replace(one, regrets=np.hstack(regrets), best=np.hstack(best)))
     carried = {name: np.stack([getattr(one, name) for one in after]) for name in _CARRIED}
     random = np.stack([np.stack([one.random, one.luck], axis=1) for one in after])
-    regrets = np.stack([one.regrets for one in after])
-    best = np.stack([one.best for one in after])
     played = game["regrets"].shape[1] + turns
     return {
         **game,
@@ -97,8 +106,8 @@ def _play(params: BanditParams, game: Game, turns: int, test: bool) -> Game:
         "tried": game["tried"] if test else carried["visits"],
         "random": random,
         "costs": np.array([one.costs[-1] for one in after]),
-        "regrets": np.hstack([game["regrets"], regrets]),
-        "best": np.hstack([game["best"], best]),
+        "regrets": np.hstack([game["regrets"], [one.regrets for one in after]]),
+        "best": np.hstack([game["best"], [one.best for one in after]]),
         "after": np.append(game["after"], played),
         "simple": np.hstack([game["simple"], simple_regret(carried)[:, None]]),
     }

@@ -12,6 +12,7 @@ from labs.reinforcement_learning.bandits.game import Game, alone, deal, play, re
 from labs.reinforcement_learning.bandits.params import STRATEGIES, BanditParams
 from labs.reinforcement_learning.bandits.picture import draw_doors
 from labs.reinforcement_learning.bandits.plots import ORDER, PLOTS, curves, numbers
+from labs.resumable import run_to_completion
 from labs.scene import Scene
 
 BATCHES = 100
@@ -64,18 +65,18 @@ class BanditsLab(Lab[BanditParams, BanditState]):
             live, wait = alone(params, state.game, params.shown), 0.0
             opened = _none(live)
         if wait >= 1.0 and live["regrets"].shape[1] < params.length:
-            after = play(params, live, 1)
+            after = run_to_completion(play(params, live, 1))
             opened = (after["visits"] - live["visits"])[:, 0].argmax(axis=1)
             live, wait = after, wait - 1.0
         wait = min(wait, 1.0)
         t = state.t + self.period
         return replace(state, t=t, live=live, opened=opened, wait=wait, rules=params.rules)
 
-    def solve(self, params: BanditParams, state: BanditState) -> Iterator[Snapshot]:
+    def solve(self, params: BanditParams, state: BanditState) -> Iterator[Snapshot | None]:
         """From the first turn on: some turns an iteration."""
         game, turns = restart(params, state.game), params.length
         for i in range(1, BATCHES + 1):
-            game = play(params, game, i * turns // BATCHES - game["regrets"].shape[1])
+            game = yield from play(params, game, i * turns // BATCHES - game["regrets"].shape[1])
             done = f"{turns} turns of {len(game['begun'])} players each." if i == BATCHES else ""
             yield Snapshot(i, game, done, i / BATCHES)
 
@@ -102,7 +103,8 @@ class BanditsLab(Lab[BanditParams, BanditState]):
         """Compiles the loop of the turns; all strategies share it."""
         params = BanditParams()
         assert set(params.strategies) <= set(STRATEGIES)
-        next(cls().solve(params, cls().init(params, np.random.default_rng(0))))
+        work = cls().solve(params, cls().init(params, np.random.default_rng(0)))
+        next(snapshot for snapshot in work if snapshot is not None)
 
 
 def _none(live: Game) -> np.ndarray:

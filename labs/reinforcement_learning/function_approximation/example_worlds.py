@@ -47,7 +47,7 @@ class Triad:
 
     def fields(self, params: ApproximationParams, training: Training) -> Fields:
         values = triad.eigenvalues(params)
-        found = {"steps": training["steps"], "weights": training["path"]}
+        found = {"steps": training["steps"], "weights": training["path"][params.shown]}
         found |= {"real": values.real, "imaginary": values.imag}
         return found | spread("error", training["error"])
 
@@ -80,7 +80,7 @@ class Spiral:
         return {"error_now": float(training["error"][:, -1].mean())}
 
     def fields(self, params: ApproximationParams, training: Training) -> Fields:
-        ways = training["path"]
+        ways = training["path"][params.shown]
         around = np.linspace(ways.min() - 40.0, ways.max() + 4.0, 600)
         curve_x, curve_y = spiral.in_plane(spiral.curve(around))
         fine = np.interp(np.linspace(0, len(ways) - 1, 800), np.arange(len(ways)), ways)
@@ -95,7 +95,7 @@ class Spiral:
     def draw(
         self, scene: Scene, params: ApproximationParams, training: Training, motion: Motion
     ) -> None:
-        draw_spiral(scene, training["path"])
+        draw_spiral(scene, training["path"][params.shown])
 
 
 class Nine:

@@ -20,7 +20,7 @@ outwards where gamma > 8 eps / (3 + 2 eps). Monte Carlo's is -eps |V|^2 / 3: it 
 
 A training has, besides what every one has, of S learners with one weight each:
 
-    w (S,)  random (S, 4)      error (S, k)   sqrt of the value error      path (k,)  w of the first
+    w (S,)  random (S, 4)      error, path (S, k)   sqrt of the value error, and w, so far
 """
 
 import numpy as np
@@ -67,7 +67,7 @@ def begin(params: ApproximationParams, rng: np.random.Generator) -> Training:
         "random": seeded(rng, LEARNERS),
         "steps": np.zeros(1),
         "error": value_error(np.zeros(LEARNERS))[:, None],
-        "path": np.zeros(1),
+        "path": np.zeros((LEARNERS, 1)),
         "sound": np.array(True),
     }
 
@@ -85,7 +85,7 @@ def learn(params: ApproximationParams, training: Training) -> Resumable[Training
         "random": random,
         "steps": np.append(training["steps"], float(done + part)),
         "error": np.column_stack([training["error"], value_error(w)]),
-        "path": np.append(training["path"], w[0]),
+        "path": np.column_stack([training["path"], w]),
         "sound": np.array(bool(sound.all())),
     }
 

@@ -6,7 +6,7 @@ has, of S learners with d weights each:
 
     w, h (S, d)  count (S, 1)  random (S, 4)  errors, alive (S,)    labs/algorithms/approximation.py
     error (S, k)     sqrt of the value error after each iteration
-    path (k, d)      the weights of the first learner
+    path (S, k, d)   the weights after each of them
 """
 
 from functools import lru_cache
@@ -104,7 +104,7 @@ def begin(params: ApproximationParams, rng: np.random.Generator) -> Training:
     return {
         "steps": np.zeros(1),
         "error": first.errors[:, None],
-        "path": first.w[:1],
+        "path": first.w[:, None],
         "sound": np.array(True),
     } | arrays_of(first)
 
@@ -128,7 +128,7 @@ def learn(params: ApproximationParams, training: Training) -> Resumable[Training
         "errors": errors,
         "steps": np.append(training["steps"], float(after.count.max())),
         "error": np.column_stack([training["error"], errors]),
-        "path": np.concatenate([training["path"], after.w[:1]]),
+        "path": np.concatenate([training["path"], after.w[:, None]], axis=1),
         "sound": np.array(bool(after.sound.all())),
     }
 

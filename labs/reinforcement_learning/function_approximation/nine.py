@@ -5,8 +5,10 @@
 
     table       two rooms (`rooms`), told apart
     linear      two rooms that look alike; Q-learning: Baird's star with two controls
-    nonlinear   MC control: the wheel (`rooms`); SARSA and Q-learning: the spiral (`spiral`), where
-                there is one control, and both are TD(0)
+    nonlinear   MC control: the wheel (`rooms`); SARSA and Q-learning: the spiral (`spiral`). Its
+                controls, to stay and to go on, are free and have the same q, so that all are
+                greedy and one is drawn: SARSA's target and Q-learning's are both TD(0)'s, and the
+                two panels differ in luck alone
 
 A training has, besides what every one has, after k rounds, cells numbered row by row:
 
@@ -55,7 +57,7 @@ def begin(params: ApproximationParams, rng: np.random.Generator) -> Training:
         "wheel": np.array(0.25),
         "spiral": np.zeros(2),
         "random_wheel": seeded(rng, 1),
-        "random_spiral": np.repeat(seeded(rng, 1), 2, axis=0),
+        "random_spiral": seeded(rng, 2),
         "alive_wheel": np.ones(1, bool),
         "alive_spiral": np.ones(2, bool),
     }
@@ -90,9 +92,11 @@ def learn(params: ApproximationParams, training: Training) -> Resumable[Training
     changes[2] += abs(np.floor(turned) - before)
     after |= {"wheel": np.array(turned), "random_wheel": random}
     w, random = training["spiral"].copy(), training["random_spiral"].copy()
-    if training["alive_spiral"].all():
-        alive = spiral.follow(w, random, SPIRAL_RULE, SPIRAL_GAMMA, True, part, done)
-        after |= {"spiral": w, "random_spiral": random, "alive_spiral": alive}
+    alive = training["alive_spiral"].copy()
+    for s in np.flatnonzero(alive):
+        one = slice(s, s + 1)
+        alive[one] = spiral.follow(w[one], random[one], SPIRAL_RULE, SPIRAL_GAMMA, True, part, done)
+    after |= {"spiral": w, "random_spiral": random, "alive_spiral": alive}
     shown, distance = _looks(after)
     return after | {
         "steps": np.append(training["steps"], float(done + part)),

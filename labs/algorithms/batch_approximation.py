@@ -17,15 +17,18 @@ converges (`approximation`); the third, Q-learning, may diverge."""
 from typing import NamedTuple
 
 import numpy as np
+import scipy.sparse
+import scipy.sparse.linalg
 
 from labs.algorithms.approximation import shortest_solution
-from labs.algorithms.features import Features, add_features, evaluate
+from labs.algorithms.features import Features, add_features, evaluate, values
 from labs.algorithms.monte_carlo import costs_to_go
 from labs.compiled import compiled
 from labs.errors import LabError
 from labs.problems.episodes import UpdateRule, step_size
 from labs.problems.prediction import PredictionTask, empty_episode, sample_episode
 from labs.random_numbers import below
+from labs.resumable import Resumable, pieces
 
 REPLAY_MC, REPLAY_TD = range(2)
 
@@ -47,48 +50,102 @@ class Transitions(NamedTuple):
 
 def collect_transitions(task: PredictionTask, random: np.ndarray, episodes: int) -> Transitions:
     """What happens in so many episodes. `random` (4,) uint64 changes in place."""
-    room, parts = empty_episode(task.task.horizon), []
+    (x, u, y), (cost, returns) = _collect(task, random, episodes)
+    return Transitions(x, u, cost, y, returns)
+
+
+@compiled
+def _collect(
+    task: PredictionTask, random: np.ndarray, episodes: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """x, u, y (3, N) and cost, returns (2, N)."""
+    room, met = empty_episode(task.task.horizon), 0
+    indices, numbers = np.empty((3, 0), np.int64), np.empty((2, 0))
     for _ in range(episodes):
         T = sample_episode(task, random, room)
         costs_to_go(task.task.gamma, room, T, 0.0)
-        states = room.states[: T + 1].copy()
-        arrays = (room.controls, room.costs, room.returns)
-        controls, costs, returns = (array[:T].copy() for array in arrays)
-        parts.append((states[:-1], controls, costs, states[1:], returns))
-    return Transitions(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+        if met + T > indices.shape[1]:
+            wide = 2 * (met + T)
+            more, further = np.empty((3, wide), np.int64), np.empty((2, wide))
+            more[:, :met], further[:, :met] = indices[:, :met], numbers[:, :met]
+            indices, numbers = more, further
+        for t in range(T):
+            indices[0, met + t], indices[1, met + t] = room.states[t], room.controls[t]
+            indices[2, met + t] = room.states[t + 1]
+            numbers[0, met + t], numbers[1, met + t] = room.costs[t], room.returns[t]
+        met += T
+    return indices[:, :met].copy(), numbers[:, :met].copy()
 
 
 def least_squares_fit(features: Features, batch: Transitions) -> np.ndarray:
-    """w (d,) of the least squares fit, the shortest where there are several. All visits of a state
-    ask for the mean of their J."""
-    visits = np.bincount(batch.x, minlength=len(features.active))
+    """w (d,) of the least squares fit, the shortest where there are several."""
+    return _fit(features, batch.x, batch.returns)
+
+
+def _fit(features: Features, x: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    """The same to targets (N,) in the states x (N,). All visits of a state ask for their mean."""
+    visits = np.bincount(x, minlength=len(features.active))
+    sums = np.bincount(x, targets, minlength=len(visits))
+    if _apart(features):
+        i, phi = features.active[:, 0], features.value[:, 0]
+        squares = np.bincount(i, visits * phi**2, minlength=features.size)
+        products = np.bincount(i, sums * phi, minlength=features.size)
+        return np.divide(products, squares, out=np.zeros(features.size), where=squares > 0.0)
     seen = np.flatnonzero(visits)
     root = np.sqrt(visits[seen])
-    sums = np.bincount(batch.x, batch.returns, minlength=len(visits))[seen]
-    return shortest_solution(features.dense[seen] * root[:, None], sums / root)
+    return shortest_solution(features.dense[seen] * root[:, None], sums[seen] / root)
+
+
+def _apart(features: Features) -> bool:
+    """Whether no state has more than one: a table, or groups of states."""
+    return bool(features.active.shape[1] == 1)
 
 
 def lstd(features: Features, batch: Transitions, gamma: float) -> np.ndarray:
     """w (d,) of LSTD, the shortest of least residual where there are several or none."""
-    phi, states = features.dense, len(features.active)
-    counts = np.zeros((states, states))
-    np.add.at(counts, (batch.x, batch.y), 1.0)
+    states, few = len(features.active), 4 * features.active.shape[1] < features.size
+    phi = features.sparse if few else features.dense
+    met = (np.ones(len(batch.x)), (batch.x, batch.y))
+    counts = scipy.sparse.csr_array(met, shape=(states, states))
     cost = np.bincount(batch.x, batch.cost, minlength=states)
-    A = phi.T @ (counts.sum(axis=1)[:, None] * phi - gamma * counts @ phi)
-    return shortest_solution(A, phi.T @ cost)
+    A = phi.T @ (scipy.sparse.diags_array(counts.sum(axis=1)) @ phi - gamma * (counts @ phi))
+    b = phi.T @ cost
+    found = _chain_solution(A.tocsc(), b) if few and _apart(features) else None
+    return shortest_solution(A.toarray() if few else A, b) if found is None else found
+
+
+def _chain_solution(A: scipy.sparse.csc_array, b: np.ndarray) -> np.ndarray | None:
+    """w (d,) with A w = b, for the sparse A of groups of states: off its diagonal nothing is above
+    0, its rows sum to 0 or more, so that A^-1 >= 0 and |A^-1| = max A^-1 1. 0 for groups never met;
+    None where A is singular otherwise, or nearly."""
+    met, w = np.flatnonzero(A.diagonal()), np.zeros(len(b))
+    own = A[met][:, met]
+    if not len(met) or abs(A).sum() > abs(own).sum():
+        return None
+    try:
+        # States along a line stay in their order: A is a band.
+        factors = scipy.sparse.linalg.splu(own.tocsc(), permc_spec="NATURAL")
+    except RuntimeError:
+        return None
+    condition = abs(own).sum(axis=1).max() * np.abs(factors.solve(np.ones(len(met)))).max()
+    if not condition * len(met) * np.finfo(float).eps < 1.0:
+        return None
+    w[met] = factors.solve(b[met])
+    return w
 
 
 def fitted_q_iteration(
     features: Features, batch: Transitions, gamma: float, w: np.ndarray
-) -> np.ndarray:
+) -> Resumable[np.ndarray]:
     """The next w (U, d): for each control a fit to the targets of its own transitions. A control
     that was never tried keeps its weights."""
-    phi, fitted = features.dense, w.copy()
-    targets = batch.cost + gamma * (phi[batch.y] @ w.T).min(axis=1)
+    fitted = w.copy()
+    targets = batch.cost + gamma * values(features, w).min(axis=0)[batch.y]
     for u in range(len(w)):
         tried = batch.u == u
         if tried.any():
-            fitted[u] = shortest_solution(phi[batch.x[tried]], targets[tried])
+            fitted[u] = _fit(features, batch.x[tried], targets[tried])
+        yield
     return fitted
 
 
@@ -102,12 +159,14 @@ def replay(
     random: np.ndarray,
     draws: int,
     drawn: int = 0,
-) -> np.ndarray:
+) -> Resumable[np.ndarray]:
     """w (d,) after so many further updates of prediction, `drawn` of which were made before.
     `random` (4,) uint64 changes in place. Raises LabError for an empty batch."""
     # v is q of a single control.
     alone, bootstrap = batch._replace(u=np.zeros_like(batch.u)), method == REPLAY_TD
-    after = _replayed(features, alone, gamma, rule, bootstrap, w[None], random, draws, drawn)
+    after = yield from _replayed(
+        features, alone, gamma, rule, bootstrap, w[None], random, draws, drawn
+    )
     return np.asarray(after[0])
 
 
@@ -120,10 +179,10 @@ def replay_q_learning(
     random: np.ndarray,
     draws: int,
     drawn: int = 0,
-) -> np.ndarray:
+) -> Resumable[np.ndarray]:
     """w (U, d) after so many further updates of Q-learning, as `replay`. It stops short of the
     update after the one whose error leaves the rule's limit."""
-    return _replayed(features, batch, gamma, rule, True, w, random, draws, drawn)
+    return (yield from _replayed(features, batch, gamma, rule, True, w, random, draws, drawn))
 
 
 def _replayed(
@@ -136,11 +195,15 @@ def _replayed(
     random: np.ndarray,
     draws: int,
     drawn: int,
-) -> np.ndarray:
+) -> Resumable[np.ndarray]:
     if not len(batch.x):
         raise LabError("an empty batch teaches nothing: collect some episodes first")
-    learned = np.array(w, float)
-    _replay(features, batch, gamma, rule, bootstrap, learned, random, draws, drawn)
+    learned, work = np.array(w, float), (len(w) + 2) * (features.active.shape[1] + 10)
+    for some in pieces(draws, work):
+        if not _replay(features, batch, gamma, rule, bootstrap, learned, random, some, drawn):
+            break
+        drawn += some
+        yield
     return learned
 
 
@@ -155,7 +218,8 @@ def _replay(
     random: np.ndarray,
     draws: int,
     drawn: int,
-) -> None:
+) -> bool:
+    """False where an error left the rule's limit."""
     for n in range(drawn + 1, drawn + draws + 1):
         i = below(random, len(batch.x))
         target = batch.returns[i]
@@ -168,4 +232,5 @@ def _replay(
         delta = target - evaluate(features, mine, batch.x[i])
         add_features(features, mine, batch.x[i], step_size(rule, n) * delta)
         if not abs(delta) <= rule.limit:
-            return
+            return False
+    return True

@@ -18,6 +18,7 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
+import scipy.sparse
 
 from labs.compiled import inlined
 from labs.errors import LabError
@@ -39,6 +40,13 @@ class Features(NamedTuple):
         phi = np.zeros((len(self.active), self.size))
         np.put_along_axis(phi, self.active, self.value, axis=1)
         return phi
+
+    @property
+    def sparse(self) -> scipy.sparse.csr_array:
+        """The same, of which only what may differ from 0 is stored."""
+        rows = np.arange(len(self.active) + 1) * self.active.shape[1]
+        entries = (self.value.ravel(), self.active.ravel(), rows)
+        return scipy.sparse.csr_array(entries, shape=(len(self.active), self.size))
 
 
 def from_matrix(phi: np.ndarray) -> Features:

@@ -139,9 +139,9 @@ def _unit(params: ApproximationParams) -> str:
         return "updates"
     if params.world == "nine" or params.data == "latest":
         return "episodes"
-    # A least squares answer at once is for prediction.
-    once = params.data == "batch" and params.world != "swing"
-    return "solutions" if once else "% of the draws"
+    if params.data == "replay":
+        return "% of the draws"
+    return "fits" if params.world == "swing" else "solutions"
 
 
 def _done(params: ApproximationParams, training: Training) -> str:
@@ -161,6 +161,11 @@ def _why(params: ApproximationParams) -> str:
         return (
             "The weight ran outwards along the spiral: nonlinear TD(0) may diverge. "
             "Switch bootstrapping off, or take gamma below 0.129."
+        )
+    if params.data == "batch":
+        return (
+            "The weights grew beyond all bounds: the batch tells too little for these features, "
+            "and fits follow one another. Take more episodes or fewer features."
         )
     return (
         "The weights grew beyond all bounds: the step size is too large for these features. "

@@ -1,6 +1,6 @@
 """What the user turns in function approximation: the world, its features, how weights move."""
 
-from labs.params import Group, Params
+from labs.params import Group, Params, Value
 from labs.reinforcement_learning.function_approximation.feature_sets import FEATURE_SETS
 
 WORLDS = {
@@ -18,27 +18,29 @@ TARGETS = {
     "td": "TD(0)",
     "td-lambda": "TD(λ)",
 }
+BATCH_TARGETS = {name: label for name, label in TARGETS.items() if name != "td-lambda"}
+"""A sample out of a batch has lost its episode, and with it its trace."""
 CONTROLLERS = {"mc": "MC control", "sarsa": "SARSA", "q-learning": "Q-learning"}
 """In the order of the numbers in labs/algorithms/linear_control.py."""
 DATA = {
     "latest": "The latest sample, once",
     "replay": "Samples out of a buffer",
-    "batch": "Least squares at once",
+    "batch": "Least squares",
 }
 LEARNERS = 6
 SHOWN_FEATURES = 12
 """One at a time on the plane, as many at once on the line."""
 ITERATIONS = 100
 
-LINE = {"world": "walk"}
 PLANE = {"world": ["surface", "swing"]}
-LEARNING_RATE = {"world": [world for world in WORLDS if world != "nine"]}
-"""The nine learners have step sizes of their own."""
 PREDICTION = {"world": ["walk", "surface"]}
-SWING = {"world": "swing"}
 FITTED = {"world": ["walk", "surface", "swing"]}
 TRIAD = {"world": ["star", "pair"]}
-BOOTSTRAPPED = {"world": ["star", "pair", "spiral"]}
+EXAMPLES: dict[str, Value | list[Value]] = {"world": ["star", "pair", "spiral"]}
+BOOTSTRAPPED: dict[str, Value | list[Value]] = {**EXAMPLES, "bootstrap": True}
+LEARNING_RATE = ({**FITTED, "data": ["latest", "replay"]}, EXAMPLES)
+"""Least squares takes no steps; the nine learners have step sizes of their own."""
+SIZED: dict[str, list[Value]] = {"features": [name for name in FEATURE_SETS if name != "table"]}
 
 WORLD = Group("World", effect="restart")
 FEATURES = Group("Features", effect="restart")
@@ -57,28 +59,38 @@ class ApproximationParams(Params):
     )
     """Of the next state's value."""
     ending: float = WORLD.knob(
-        0.1, 0.0, 1.0, "p", "", "Chance to end", step=0.01, when={"world": "pair"}
-    )
+        0.1, 0.0, 1.0, "p", "", "Chance to end", step=0.01,
+        when=({"world": "pair", "bootstrap": True}, {"world": "pair", "off_policy": False}),
+    )  # fmt: skip
     """Of each step in the second state."""
 
     features: str = FEATURES.choice("aggregation", FEATURE_SETS, "Features", key=True, when=FITTED)
     """What the value is a weighted sum of."""
     n: float = FEATURES.knob(
-        10, 1, 20, "n", "", "Groups, order, cells", step=1, key=True, when=LINE
-    )
+        10, 1, 20, "n", "", "Groups, order, cells", step=1, key=True,
+        when={"world": "walk", **SIZED},
+    )  # fmt: skip
     """Groups, centers or cells along the line; the order of a polynomial or of a Fourier series."""
-    m: float = FEATURES.knob(6, 1, 10, "m", "", "The same, each way", step=1, key=True, when=PLANE)
+    m: float = FEATURES.knob(
+        6, 1, 10, "m", "", "The same, each way", step=1, key=True, when={**PLANE, **SIZED}
+    )
     """Along the angle and along the velocity: their products are the features."""
 
     data: str = LEARNING.choice(
         "latest", DATA, "Learns from", effect="restart", key=True, when=FITTED
     )
     """Each sample once as it comes; or from a fixed batch of episodes, in random order, again and
-    again; or the weights of least squares (prediction only)."""
+    again; or the weights that fit the batch best: at once for a given policy, else fit after fit
+    to the targets of Q-learning."""
     target: str = LEARNING.choice(
-        "mc", TARGETS, "Target", effect="restart", key=True, when=PREDICTION
+        "mc", TARGETS, "Target", effect="restart", key=True, when={**PREDICTION, "data": "latest"}
     )
     """What v(x, w) is moved towards."""
+    batch_target: str = LEARNING.choice(
+        "mc", BATCH_TARGETS, "Target", effect="restart", key=True,
+        when={**PREDICTION, "data": ["replay", "batch"]},
+    )  # fmt: skip
+    """What v(x, w) is moved towards, or fitted to."""
     controller: str = LEARNING.choice(
         "sarsa",
         CONTROLLERS,
@@ -112,7 +124,7 @@ class ApproximationParams(Params):
         "Trace decay",
         step=0.01,
         key=True,
-        when={"world": ["walk", "surface"], "target": "td-lambda"},
+        when={**PREDICTION, "data": "latest", "target": "td-lambda"},
     )
     """0 is TD(0), 1 close to Monte Carlo."""
     epsilon: float = LEARNING.knob(
@@ -143,21 +155,23 @@ class ApproximationParams(Params):
     )  # fmt: skip
     """How often a sample of the batch is drawn, on average."""
     updates: float = LEARNING.knob(
-        2000, 100, 100000, "T", "", "Updates", scale="log", key=True, when=BOOTSTRAPPED
+        2000, 100, 100000, "T", "", "Updates", scale="log", key=True, when=EXAMPLES
     )
     """Of each learner."""
 
     approximate: bool = TOGETHER.toggle(True, "Approximation", key=True, when=TRIAD)
     """Features that states share; else a table."""
-    bootstrap: bool = TOGETHER.toggle(True, "Bootstrapping", key=True, when=BOOTSTRAPPED)
+    bootstrap: bool = TOGETHER.toggle(True, "Bootstrapping", key=True, when=EXAMPLES)
     """The target is l + γ v(x', w); else the true cost-to-go."""
     off_policy: bool = TOGETHER.toggle(True, "Off-policy", key=True, when=TRIAD)
     """States come as often as another policy than the one judged visits them."""
-    correct: bool = TOGETHER.toggle(False, "Gradient correction (TDC)", key=True, when=TRIAD)
-    """Where it bootstraps: the true gradient of another error, by second weights."""
+    correct: bool = TOGETHER.toggle(
+        False, "Gradient correction (TDC)", key=True, when={**TRIAD, "bootstrap": True}
+    )
+    """The true gradient of another error, by second weights."""
     beta: float = TOGETHER.knob(
         0.05, 1e-3, 1.0, r"\beta", "", "Second step size", scale="log",
-        when={"world": ["star", "pair"], "correct": True},
+        when={**TRIAD, "bootstrap": True, "correct": True},
     )  # fmt: skip
     """Of TDC's second weights."""
 
@@ -170,7 +184,7 @@ class ApproximationParams(Params):
     """Thin lines are the truth."""
     feature: float = VIEW.knob(1, 1, 100, "i", "", "Feature", step=1, when=PLANE)
     """Which one the map shows."""
-    learner: float = VIEW.knob(1, 1, LEARNERS, "s", "", "Learner", step=1, when=LEARNING_RATE)
+    learner: float = VIEW.knob(1, 1, LEARNERS, "s", "", "Learner", step=1, when=(FITTED, EXAMPLES))
     """Which of those who learn side by side is shown."""
 
     @property

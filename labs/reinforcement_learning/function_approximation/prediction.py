@@ -6,7 +6,8 @@ A training has, besides what every one has, of S learners with d weights each:
     luck (S, 4)      the generators at the beginning: a fixed batch is drawn from them
     error (S, k)     sqrt of the value error after each iteration
     squares (S,)     that of least squares on the batch, where there is one
-"""
+
+The batch tells of each of its states what it cost from there on; to an oracle, the true value."""
 
 from functools import lru_cache
 
@@ -45,7 +46,7 @@ from labs.reinforcement_learning.function_approximation.predictors import (
     predictors_of,
 )
 from labs.reinforcement_learning.function_approximation.subject import Training
-from labs.resumable import Resumable
+from labs.resumable import Resumable, pieces
 from labs.tasks.random_walk.walks import THOUSAND, walk_task
 
 METHODS = {
@@ -54,6 +55,8 @@ METHODS = {
     "td": SEMI_GRADIENT_TD,
     "td-lambda": SEMI_GRADIENT_LAMBDA,
 }
+STEPS = 100
+"""Of an episode, about."""
 LIMIT = 1e3
 """No weight that converges gets as large."""
 
@@ -83,13 +86,16 @@ def learn(params: ApproximationParams, training: Training) -> Resumable[Training
     """The next hundredth of the episodes, or of the draws from a batch."""
     given, rule = given_policy(params), _rule(params)
     if params.data == "latest":
-        part, method = max(1, round(params.episodes / ITERATIONS)), METHODS[params.target]
-        learners = approximation.step(
-            given.task, given.features, rule, method, predictors_of(training), part
-        )
-        return _recorded(training, arrays_of(learners), part)
-    episodes = round(params.batch)
-    batches = [batch_of(params.world, luck.tobytes(), episodes) for luck in training["luck"]]
+        part = max(1, round(params.episodes / ITERATIONS))
+        after = yield from _by_episodes(params, given, rule, training, part)
+        return _recorded(training, after, part)
+    batches = []
+    for luck in training["luck"]:
+        batch = batch_of(params.world, luck.tobytes(), round(params.batch))
+        if params.batch_target == "oracle":
+            batch = batch._replace(returns=given.task.truth[batch.x])
+        batches.append(batch)
+        yield
     if not training["squares"].size:
         fitted = []
         for batch in batches:
@@ -98,7 +104,30 @@ def learn(params: ApproximationParams, training: Training) -> Resumable[Training
         training = {**training, "squares": np.array([given.error(w) for w in fitted])}
         if params.data == "batch":
             return _recorded(training, {"w": np.stack(fitted), "errors": training["squares"]}, 1)
-    return _recorded(training, _replayed(params, given, rule, training, batches), 1)
+    after = yield from _replayed(params, given, rule, training, batches)
+    return _recorded(training, after, 1)
+
+
+def _by_episodes(
+    params: ApproximationParams,
+    given: GivenPolicy,
+    rule: UpdateRule,
+    training: Training,
+    part: int,
+) -> Resumable[dict[str, np.ndarray]]:
+    """After so many further episodes, one learner after the other."""
+    features, method = given.features, METHODS[params.target]
+    work = STEPS * (3 * (features.active.shape[1] + 10))
+    if method == SEMI_GRADIENT_LAMBDA:
+        work += STEPS * 2 * features.size  # the traces of all weights
+    names, done = arrays_of(predictors_of(training)), []
+    for s in range(LEARNERS):
+        alone = predictors_of({name: array[s : s + 1] for name, array in names.items()})
+        for some in pieces(part, work):
+            alone = approximation.step(given.task, features, rule, method, alone, some)
+            yield
+        done.append(arrays_of(alone))
+    return {name: np.concatenate([one[name] for one in done]) for name in names}
 
 
 def _replayed(
@@ -107,14 +136,16 @@ def _replayed(
     rule: UpdateRule,
     training: Training,
     batches: list[Transitions],
-) -> dict[str, np.ndarray]:
+) -> Resumable[dict[str, np.ndarray]]:
     """After as many draws as make a hundredth of the uses of all samples."""
     w, random, count = (training[name].copy() for name in ("w", "random", "count"))
     method = REPLAY_TD if _bootstraps(params) else REPLAY_MC
     for s, batch in enumerate(batches):
         draws = max(1, round(params.passes * len(batch.x) / ITERATIONS))
         gamma, done = float(given.mdp.gamma), int(count[s, 0])
-        w[s] = replay(given.features, batch, gamma, rule, method, w[s], random[s], draws, done)
+        w[s] = yield from replay(
+            given.features, batch, gamma, rule, method, w[s], random[s], draws, done
+        )
         count[s] += draws
     alive = np.abs(w).max(axis=1) <= LIMIT
     w = np.where(alive[:, None], w, training["w"])
@@ -136,7 +167,7 @@ def _least_squares(given: GivenPolicy, batch: Transitions, bootstraps: bool) -> 
 
 
 def _bootstraps(params: ApproximationParams) -> bool:
-    return params.target in ("td", "td-lambda")
+    return params.batch_target == "td"
 
 
 def _rule(params: ApproximationParams) -> UpdateRule:

@@ -8,7 +8,8 @@ A training has, besides what every one has, of S learners with d weights for eac
     greedy (S, k)    cost of the greedy policy from hanging at rest, after each iteration
     error (S, k)     root mean square of min_u q - V*
 
-The batch holds short episodes from anywhere under torques drawn at random."""
+Least squares is fitted Q-iteration: an iteration fits the targets of the last one's weights. The
+batch holds short episodes from anywhere under torques drawn at random."""
 
 from functools import lru_cache
 
@@ -18,6 +19,7 @@ from labs.algorithms import linear_control, policy_iteration
 from labs.algorithms.batch_approximation import (
     Transitions,
     collect_transitions,
+    fitted_q_iteration,
     replay_q_learning,
 )
 from labs.algorithms.bellman import q_values
@@ -37,7 +39,7 @@ from labs.reinforcement_learning.function_approximation.params import (
     ApproximationParams,
 )
 from labs.reinforcement_learning.function_approximation.subject import Training
-from labs.resumable import Resumable
+from labs.resumable import Resumable, pieces
 
 HORIZON, SHORT = 100, 20
 """Steps of an episode, and of one of the batch."""
@@ -74,7 +76,7 @@ def begin(params: ApproximationParams, rng: np.random.Generator) -> Training:
 
 
 def learn(params: ApproximationParams, training: Training) -> Resumable[Training]:
-    """The next hundredth of the episodes, or of the draws from a batch."""
+    """The next hundredth of the episodes, or of the draws from a batch; or the next fit."""
     features, rule = features_of(params), UpdateRule(params.alpha, params.omega, limit=LIMIT)
     if params.data == "latest":
         part = max(1, round(params.episodes / ITERATIONS))
@@ -82,7 +84,7 @@ def learn(params: ApproximationParams, training: Training) -> Resumable[Training
     else:
         part = 1
         after = yield from _from_batches(params, features, rule, training)
-    return _recorded(features, {**training, **after}, part)
+    return (yield from _recorded(features, {**training, **after}, part))
 
 
 def _by_episodes(
@@ -94,17 +96,18 @@ def _by_episodes(
 ) -> Resumable[dict[str, np.ndarray]]:
     method = list(CONTROLLERS).index(params.controller)
     behaviour, (_, task, _) = BehaviourPolicy(epsilon=params.epsilon), swing_task()
-    none, pieces = np.zeros((1, 0)), []
+    none, done = np.zeros((1, 0)), []
+    work = HORIZON * 7 * (features.active.shape[1] + 10)  # five torques looked at, one moved
     for s in range(LEARNERS):
         w, visits, random, alive = (
             training[name][s : s + 1] for name in ("w", "visits", "random", "alive")
         )
         alone = LinearControllers(w, visits, random, none, none.astype(np.int64), alive)
-        pieces.append(
-            _arrays(linear_control.step(task, features, behaviour, rule, method, alone, part))
-        )
-        yield
-    return {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
+        for some in pieces(part, work):
+            alone = linear_control.step(task, features, behaviour, rule, method, alone, some)
+            yield
+        done.append(_arrays(alone))
+    return {name: np.concatenate([one[name] for one in done]) for name in done[0]}
 
 
 def _from_batches(
@@ -113,11 +116,15 @@ def _from_batches(
     w, random, drawn = (training[name].copy() for name in ("w", "random", "drawn"))
     for s, luck in enumerate(training["luck"]):
         batch = batch_of(luck.tobytes(), round(params.batch))
+        if params.data == "batch":
+            w[s] = yield from fitted_q_iteration(features, batch, GAMMA, w[s])
+            continue
         draws = max(1, round(params.passes * len(batch.x) / ITERATIONS))
         done = int(drawn[s])
-        w[s] = replay_q_learning(features, batch, GAMMA, rule, w[s], random[s], draws, done)
+        w[s] = yield from replay_q_learning(
+            features, batch, GAMMA, rule, w[s], random[s], draws, done
+        )
         drawn[s] += draws
-        yield
     alive = np.abs(w).max(axis=(1, 2)) <= LIMIT
     w = np.where(alive[:, None, None], w, training["w"])
     return {"w": w, "random": random, "drawn": drawn, "alive": alive}
@@ -137,7 +144,7 @@ def _arrays(learners: LinearControllers) -> dict[str, np.ndarray]:
     return {name: getattr(learners, name) for name in names} | {"alive": learners.sound}
 
 
-def _recorded(features: Features, training: Training, part: int) -> Training:
+def _recorded(features: Features, training: Training, part: int) -> Resumable[Training]:
     """With another point of each curve."""
     mdp, _, q_star = swing_task()
     greedy, error = [], []
@@ -145,6 +152,7 @@ def _recorded(features: Features, training: Training, part: int) -> Training:
         q = q_table(features, w)
         greedy.append(float(exact(mdp, q.argmin(axis=1))[HANGING]))
         error.append(float(np.sqrt(np.mean((q.min(axis=1) - q_star.min(axis=1)) ** 2))))
+        yield
     done = float(training["steps"][-1]) if training["steps"].size else 0.0
     return {
         **training,

@@ -1,5 +1,7 @@
 """Control with linear features: tables bit for bit, chattering and divergence, fixed batches."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,7 @@ from labs.algorithms.batch_approximation import (
     replay_q_learning,
 )
 from labs.algorithms.exploration import FOLLOW, BehaviourPolicy
-from labs.algorithms.features import Features, aggregation, table, vanishing
+from labs.algorithms.features import Features, aggregation, from_matrix, table, vanishing
 from labs.algorithms.linear_control import (
     MC_CONTROL,
     Q_LEARNING,
@@ -31,6 +33,7 @@ from labs.problems.episodes import UpdateRule, episodic_task
 from labs.problems.finite_mdp import FiniteMDP, random_policy
 from labs.random_numbers import seeded
 from labs.reinforcement_learning.function_approximation.counterexamples import baird
+from labs.resumable import run_to_completion
 from labs.tasks.random_walk.walks import NINETEEN, visit_share, walk_mdp, walk_task
 from tests.labs.algorithms.learning_tasks import fresh, grid, optimum, random_mdp
 
@@ -112,15 +115,28 @@ def test_a_batch_has_two_answers_and_replay_comes_to_both() -> None:
     np.testing.assert_allclose(residual / len(batch.x), 0.0, atol=1e-12)
     assert np.abs(phi @ (fit - fixed)).max() > 0.3
     rule = UpdateRule(0.5, 0.5)
+
+    def replayed(
+        method: int, w: np.ndarray, random: np.ndarray, draws: int, drawn: int = 0
+    ) -> np.ndarray:
+        work = replay(features, batch, 1.0, rule, method, w, random, draws, drawn)
+        return run_to_completion(work)
+
     for method, answer in ((REPLAY_MC, fit), (REPLAY_TD, fixed)):
         random = seeded(np.random.default_rng(1), 1)[0]
-        w = replay(features, batch, 1.0, rule, method, np.zeros(5), random, 6_000_000)
+        w = run_to_completion(
+            replay(features, batch, 1.0, rule, method, np.zeros(5), random, 6_000_000)
+        )
         np.testing.assert_allclose(phi @ w, phi @ answer, atol=0.05)
         again = seeded(np.random.default_rng(1), 1)[0]
-        half = replay(features, batch, 1.0, rule, method, np.zeros(5), again, 70)
-        half = replay(features, batch, 1.0, rule, method, half, again, 30, drawn=70)
+        half = replayed(method, np.zeros(5), again, 70)
+        half = run_to_completion(
+            replay(features, batch, 1.0, rule, method, half, again, 30, drawn=70)
+        )
         once = seeded(np.random.default_rng(1), 1)[0]
-        whole = replay(features, batch, 1.0, rule, method, np.zeros(5), once, 100)
+        whole = run_to_completion(
+            replay(features, batch, 1.0, rule, method, np.zeros(5), once, 100)
+        )
         assert np.array_equal(half, whole)
 
 
@@ -151,11 +167,13 @@ def test_a_fixed_batch_teaches_the_optimum_by_a_table() -> None:
     seen = FiniteMDP(mdp.C, 0.7, mdp.terminal, P=counts / counts.sum(axis=2, keepdims=True))
     w = np.zeros((2, 5))
     for _ in range(80):
-        w = fitted_q_iteration(features, batch, 0.7, w)
+        w = run_to_completion(fitted_q_iteration(features, batch, 0.7, w))
     np.testing.assert_allclose(q_table(features, w), optimum(seen), atol=1e-9)
     random = seeded(np.random.default_rng(5), 1)[0]
     rule = UpdateRule(1.0, 0.6)
-    learned = replay_q_learning(features, batch, 0.7, rule, np.zeros((2, 5)), random, 1_000_000)
+    learned = run_to_completion(
+        replay_q_learning(features, batch, 0.7, rule, np.zeros((2, 5)), random, 1_000_000)
+    )
     np.testing.assert_allclose(q_table(features, learned), optimum(seen), atol=0.02)
     np.testing.assert_allclose(q_table(features, learned), optimum(mdp), atol=0.1)
 
@@ -178,4 +196,15 @@ def test_what_does_not_fit_is_refused() -> None:
     empty = Transitions(*(np.zeros(0, int) for _ in range(5)))
     random = seeded(np.random.default_rng(0), 1)[0]
     with pytest.raises(LabError, match="empty batch"):
-        replay(good, empty, 1.0, rule, REPLAY_TD, np.zeros(good.size), random, 1)
+        run_to_completion(replay(good, empty, 1.0, rule, REPLAY_TD, np.zeros(good.size), random, 1))
+
+
+@pytest.mark.parametrize("gamma", [1.0, 0.9])
+def test_lstd_of_groups_of_states_is_that_of_any_features(gamma: float) -> None:
+    """Solved by its band; the same features, written as a matrix, by rank."""
+    batch, apart = batch_of_walks(5), vanishing(table(21), walk_task(NINETEEN).task.terminal)
+    for few in (batch, Transitions(*(column[:7] for column in batch))):  # the second is cut
+        for features in (apart, walk_groups()):
+            dense = from_matrix(features.dense)
+            for answers in (least_squares_fit, partial(lstd, gamma=gamma)):
+                np.testing.assert_allclose(answers(features, few), answers(dense, few), atol=1e-9)

@@ -150,7 +150,7 @@ def test_two_states_diverge_beyond_the_threshold(setting: Settings) -> None:
     for gamma, grows in ((0.88, False), (0.91, True)):
         world = world_of(setting, gamma=gamma, updates=20_000.0)
         assert (measured(world, "growth") > 0.0) == grows
-        path = np.abs(world.state.training["path"][:, 0])
+        path = np.abs(world.state.training["path"][0, :, 0])
         assert (path[-1] > 1.5 * path[0]) == grows
     calm = world_of(setting, gamma=0.99, off_policy=False)
     assert error(calm) < 1e-2
@@ -221,7 +221,7 @@ def test_replay_comes_to_least_squares(setting: Settings) -> None:
     once = world_of(setting, data="latest", episodes=100.0, alpha=2e-4).state.training
     assert once["error"][:, 0].mean() == pytest.approx(0.41, abs=0.01)
     assert once["error"][:, -1].mean() == pytest.approx(0.36, abs=0.02)
-    by_td = world_of(setting, target="td", alpha=0.01)
+    by_td = world_of(setting, batch_target="td", alpha=0.01)
     assert error(by_td) == pytest.approx(measured(by_td, "error_squares"), abs=0.03)
 
 

@@ -159,7 +159,8 @@ class Solution:
         """The data of a snapshot, put together as the lab's `own` first ones are.
 
         Names, kinds and ranks have to be those of `own`, and shapes too, but along axes that
-        differ among `own`: those grow from iteration to iteration. Raises LabError."""
+        differ among `own`, or are empty yet: those grow from iteration to iteration. Raises
+        LabError."""
         shapes = [
             {name: a.shape for name, a in flatten(_without_durations(one.data))} for one in own
         ]
@@ -203,7 +204,9 @@ def _cast_like(
         kinds = [KINDS.get(a.dtype.kind, "something else") for a in (array, model)]
         raise LabError(f"{name} of the solution holds {kinds[0]}; it takes {kinds[1]}")
     if array.ndim != model.ndim or not all(
-        size == own or any(other[axis] != own for other in shapes if len(other) == model.ndim)
+        size == own
+        or own == 0
+        or any(other[axis] != own for other in shapes if len(other) == model.ndim)
         for axis, (size, own) in enumerate(zip(array.shape, model.shape, strict=True))
     ):
         raise LabError(

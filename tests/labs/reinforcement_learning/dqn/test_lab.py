@@ -10,17 +10,13 @@ import numpy as np
 import pytest
 
 from labs.engine.catalog import find
-from labs.engine.headless import run
 from labs.engine.run import World
 from labs.engine.solution import Solution
 from labs.params import Value
 from labs.reinforcement_learning.dqn.controllers import compared
 from labs.reinforcement_learning.dqn.tasks import learning_task, posture_at
 from labs.tasks.environments.reach import reach
-from tests.labs.contract import same
 from tests.labs.experiments import Experiments
-from tests.served import Served
-from tests.viser_client import SceneClient
 
 EXPERIMENTS = Experiments("labs.reinforcement_learning", "dqn")
 ENTRY = find("dqn")
@@ -179,20 +175,6 @@ def test_the_best_weights_drive_where_the_solution_is_loaded() -> None:
     k = int(training["greedy"][0].argmin())
     assert training["best_cost"][0] == training["greedy"][0, k]
     assert not np.array_equal(training["best"], training["w"])
-
-
-def test_page_scene_and_headless_run_train_the_same_bit_for_bit(served: Served) -> None:
-    """Through the API that the page uses, in a worker that also draws the scene."""
-    setting = {"steps": 4000.0, "learners": 2.0, "capacity": 2000.0}
-    with served.session("dqn", params=setting, seed=7) as session:
-        with SceneClient(session) as scene, session.stream() as stream:
-            scene.skip(0.2)
-            stream.next("status", lambda s: s["solver"]["done"])
-        answer = served.http.get(f"{session.path}/solution.npz")
-    live = World(ENTRY, solution=Solution.read(answer.content))
-    headless = run("dqn", setting, seconds=0.0, seed=7)
-    assert same(dict(live.state.training), dict(headless.state.training))
-    assert not same(dict(live.state.training), dict(trained(setting).state.training))
 
 
 def test_each_controller_of_the_pendulum_drives_it_up() -> None:

@@ -63,7 +63,17 @@ class Prediction(Lab[PredictionParams, PredictionState]):
         "Five states": {},
         "Nineteen states": {"world": "nineteen", "v0": 0.0},
         "Grid world": {"world": "grid", "v0": 0.0},
-        "Pendulum under PD": {"world": "pendulum", "gamma": 0.95, "v0": 0.0},
+        # Of 651 states an episode meets few: long steps, and many episodes.
+        "Pendulum under PD": {
+            "world": "pendulum",
+            "gamma": 0.95,
+            "v0": 0.0,
+            "alpha_mc": 1.0,
+            "alpha_td": 1.0,
+            "omega": 0.6,
+            "episodes": 2000.0,
+            "shown": "all",
+        },
         "You are the predictor": {"study": "batch", "v0": 0.0},
         "Four kinds of update": {"study": "corners"},
     }

@@ -8,12 +8,14 @@ from itertools import product
 import numpy as np
 import pytest
 
+from labs import resumable
 from labs.algorithms.approximation import best_fit
 from labs.algorithms.features import fourier, polynomials
+from labs.engine.catalog import find
 from labs.engine.run import World
 from labs.lab import Snapshot
-from labs.params import Value
-from labs.reinforcement_learning.function_approximation import nine, spiral, triad
+from labs.params import Choice, Knob, Value
+from labs.reinforcement_learning.function_approximation import nine, prediction, spiral, triad
 from labs.reinforcement_learning.function_approximation.example_worlds import verdicts
 from labs.reinforcement_learning.function_approximation.given_policy import (
     PENDULUM,
@@ -22,6 +24,7 @@ from labs.reinforcement_learning.function_approximation.given_policy import (
     walk,
 )
 from labs.reinforcement_learning.function_approximation.params import ApproximationParams
+from tests.labs.contract import same
 from tests.labs.experiments import Experiments
 from tests.labs.solving import done, solved_world
 
@@ -232,6 +235,8 @@ def test_most_learn_to_swing_up_from_random_scraps(setting: Settings) -> None:
     assert not world.state.trouble
     assert (greedy.min(axis=1) < 8.0).sum() >= 5
     assert 6.75 < np.median(greedy[:, 50:]) < 9.5
+    fitted = world_of(setting, data="batch").state.training["greedy"]
+    assert (fitted[:, -1] < 9.5).all()
 
 
 def test_every_experiment_is_verified() -> None:
@@ -289,3 +294,131 @@ def test_what_diverges_says_so() -> None:
     assert "step size" in world.state.trouble
     assert np.isfinite(world.state.training["w"]).all()
     assert done(world) == "The weights left all bounds."
+
+
+def begun(setting: Settings, iterations: int = 3) -> World:
+    """A world that has learned a little."""
+    world = World(find(SLUG), setting)
+    for _ in range(iterations):
+        if world.solving:
+            world.iterate()
+    return world
+
+
+SMALL = {"batch": 20.0, "passes": 5.0, "updates": 500.0, "episodes": 100.0}
+SCRAPS = {**SMALL, "world": "swing", "features": "fourier", "m": 3.0, "alpha": 0.02}
+
+
+@pytest.mark.parametrize(
+    ("setting", "menu"),
+    [
+        ({"data": "latest"}, "target"),
+        ({"data": "replay"}, "batch_target"),
+        ({"data": "batch"}, "batch_target"),
+        ({}, "data"),
+        (SCRAPS, "data"),
+        (SCRAPS, "controller"),
+    ],
+    ids=str,
+)
+def test_every_entry_of_a_menu_learns_something_of_its_own(setting: Settings, menu: str) -> None:
+    choice = ApproximationParams.tunables[menu]
+    assert isinstance(choice, Choice)
+    learned = [begun({**SMALL, **setting, menu: entry}) for entry in choice.options]
+    assert all(world.params.acts(menu) for world in learned)
+    weights = [world.state.training["w"].tobytes() for world in learned]
+    assert len(set(weights)) == len(weights)
+
+
+def test_an_oracle_fits_the_truth_where_the_batch_has_been() -> None:
+    """With a table, exactly: however few its episodes are."""
+    for world, tolerance in (("walk", 1e-12), ("surface", 1e-12)):
+        setting = {"data": "batch", "batch_target": "oracle", "features": "table", "world": world}
+        learned = begun({**SMALL, **setting})
+        given = prediction.given_policy(_params(learned))
+        v = given.values(learned.state.training["w"][0])
+        met = v != 0.0
+        assert met.sum() > 100
+        np.testing.assert_allclose(v[met], given.task.truth[met], atol=tolerance)
+
+
+@pytest.mark.parametrize(
+    ("setting", "idle"),
+    [
+        ({"data": "batch"}, ("alpha", "omega", "passes", "episodes")),
+        ({**SCRAPS, "data": "batch"}, ("alpha", "omega", "passes", "episodes")),
+        ({"features": "table"}, ("n",)),
+        ({"world": "surface", "features": "table"}, ("m",)),
+        ({"world": "star", "bootstrap": False}, ("gamma", "correct", "beta")),
+        ({"world": "pair", "bootstrap": False}, ("gamma", "ending", "correct", "beta")),
+        ({"world": "spiral", "bootstrap": False}, ("gamma",)),
+        ({"data": "replay", "target": "td-lambda"}, ("decay",)),
+    ],
+    ids=str,
+)
+def test_a_knob_is_shown_where_it_acts(setting: Settings, idle: tuple[str, ...]) -> None:
+    world = begun({**SMALL, **setting})
+    for name in idle:
+        assert not world.params.acts(name)
+        tunable, value = ApproximationParams.tunables[name], getattr(world.params, name)
+        other = tunable.at(0.37) if isinstance(tunable, Knob) else not value
+        assert other != value
+        assert same(begun({**SMALL, **setting, name: other}).state, world.state)
+    on_policy = ApproximationParams(world="pair", bootstrap=False, off_policy=False)
+    assert on_policy.acts("ending")
+
+
+@pytest.mark.parametrize(
+    ("world", "curve"), [("star", "weights"), ("pair", "weights"), ("spiral", "way_y")]
+)
+def test_the_learner_chosen_is_the_one_shown(world: str, curve: str) -> None:
+    shown = begun({**SMALL, "world": world})
+    fields = []
+    for learner in (1.0, 2.0):
+        shown.change({"learner": learner})
+        fields.append(shown.lab.fields(shown.params, shown.state)[curve])
+    assert not np.array_equal(*fields)
+    training = shown.state.training
+    np.testing.assert_array_equal(training["path"][:, -1], training["w"])
+
+
+def test_no_two_of_the_nine_panels_are_the_same_curve() -> None:
+    shown = begun({"world": "nine"}, 50).state.training["shown"]
+    assert len({curve.tobytes() for curve in shown}) == 9
+
+
+@pytest.mark.parametrize(
+    ("setting", "pauses"),
+    [
+        ({"episodes": 20000.0, "features": "table", "target": "td-lambda"}, 50),
+        ({"world": "surface", "features": "fourier", "m": 4.0, "data": "replay"}, 6),
+        ({**SCRAPS, "m": 10.0, "alpha": 0.005, "episodes": 2000.0}, 12),
+        (
+            {
+                **SCRAPS,
+                "m": 10.0,
+                "alpha": 0.005,
+                "data": "replay",
+                "batch": 300.0,
+                "passes": 200.0,
+            },
+            30,
+        ),
+        ({**SCRAPS, "data": "batch"}, 30),
+    ],
+    ids=str,
+)
+def test_long_work_pauses_and_comes_to_the_same(
+    setting: Settings, pauses: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = []
+    for piece in (resumable.PIECE, 1e12):
+        monkeypatch.setattr(resumable, "PIECE", piece)
+        world = World(find(SLUG), setting)
+        for waits, snapshot in enumerate(world.lab.solve(world.params, world.state)):
+            if snapshot is not None:
+                found.append((waits, snapshot.data))
+                break
+    (paused, learned), (_, at_once) = found
+    assert paused >= pauses
+    assert same(dict(learned), dict(at_once))

@@ -5,9 +5,12 @@ What a thousand players do on average is a statistic: tolerances are about three
 import numpy as np
 import pytest
 
+from labs import resumable
 from labs.algorithms.bandits import SAMPLE_MEAN
 from labs.problems.episodes import step_size
+from labs.reinforcement_learning.bandits.game import Game, deal, play
 from labs.reinforcement_learning.bandits.params import TASKS, BanditParams
+from tests.labs.contract import same
 from tests.labs.experiments import Experiments
 from tests.labs.solving import Settings, done, readouts, solve, solved_world
 
@@ -181,3 +184,27 @@ def test_the_slow_game_is_one_of_the_thousand() -> None:
     world.change({"task": 4.0})
     world.advance()
     assert not world.state.live["visits"].any()
+
+
+def test_long_games_pause_and_come_to_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    """250 turns, the last lessons and the first of the test among them."""
+    params = BanditParams(everybody=True, turns=150.0, kind="active", drift=0.05)
+    found = []
+    for piece in (resumable.PIECE, 1e12):
+        monkeypatch.setattr(resumable, "PIECE", piece)
+        found.append(ended(play(params, deal(params, np.random.default_rng(1)), 250)))
+    (pauses, game), (fewest, at_once) = found
+    assert fewest == 2 * len(params.strategies)
+    assert pauses >= 4 * fewest
+    assert same(game, at_once)
+
+
+def ended(work: resumable.Resumable[Game]) -> tuple[int, dict[str, np.ndarray]]:
+    """How often it paused, and its result."""
+    pauses = 0
+    while True:
+        try:
+            next(work)
+        except StopIteration as end:
+            return pauses, dict(end.value)
+        pauses += 1

@@ -377,7 +377,7 @@ def test_the_learner_chosen_is_the_one_shown(world: str, curve: str) -> None:
     for learner in (1.0, 2.0):
         shown.change({"learner": learner})
         fields.append(shown.lab.fields(shown.params, shown.state)[curve])
-    assert not np.array_equal(*fields)
+    assert not np.array_equal(fields[0], fields[1])
     training = shown.state.training
     np.testing.assert_array_equal(training["path"][:, -1], training["w"])
 

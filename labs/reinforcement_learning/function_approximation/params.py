@@ -87,7 +87,7 @@ class ApproximationParams(Params):
     )
     """What v(x, w) is moved towards."""
     batch_target: str = LEARNING.choice(
-        "mc", BATCH_TARGETS, "Target", effect="restart", key=True,
+        "mc", BATCH_TARGETS, "Batch target", effect="restart", key=True,
         when={**PREDICTION, "data": ["replay", "batch"]},
     )  # fmt: skip
     """What v(x, w) is moved towards, or fitted to."""

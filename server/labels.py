@@ -26,6 +26,8 @@ CHARACTER, LINE = 7.0, 18.0
 """[px] the width of a character, and the height of a line."""
 MOVED, WORSE = 3.0, 0.5
 """What it costs a label to change its place, and to take the next best one."""
+ROOM = 6.0
+"""[px] A label goes back to a better place, at no cost, once nothing is so near."""
 COVERED = 40.0
 """What it costs to stand wholly on another label; a point of a robot costs 1."""
 
@@ -74,21 +76,25 @@ def arrange(labels: list[Label], obstacles: np.ndarray) -> list[str]:
     for label in labels:
         size = np.array([CHARACTER * len(label.text) + 8.0, LINE])
 
-        def box(anchor: str, at: np.ndarray = label.point, size: np.ndarray = size) -> np.ndarray:
-            middle = at + 0.5 * size * ANCHORS[anchor]
-            return np.array([middle - 0.5 * size, middle + 0.5 * size])
-
-        costs = {
-            anchor: WORSE * rank
-            + MOVED * (anchor != label.anchor)
-            + _inside(box(anchor), obstacles)
-            + COVERED * sum(_overlap(box(anchor), other) for other in taken)
-            for rank, anchor in enumerate(ANCHORS)
+        boxes = {
+            anchor: label.point + 0.5 * size * (np.array(side) + [[-1.0], [1.0]])
+            for anchor, side in ANCHORS.items()
         }
+        now = list(ANCHORS).index(label.anchor)
+        costs = {}
+        for rank, (anchor, box) in enumerate(boxes.items()):
+            returns = rank < now and not _trouble(box + [[-ROOM], [ROOM]], obstacles, taken)
+            moved = MOVED * (rank != now and not returns)
+            costs[anchor] = WORSE * rank + moved + _trouble(box, obstacles, taken)
         best = min(costs, key=costs.__getitem__)
-        taken.append(box(best))
+        taken.append(boxes[best])
         chosen.append(best)
     return chosen
+
+
+def _trouble(box: np.ndarray, obstacles: np.ndarray, taken: list[np.ndarray]) -> float:
+    """What it costs to stand in a box, for what is there already."""
+    return _inside(box, obstacles) + COVERED * sum(_overlap(box, other) for other in taken)
 
 
 def _inside(box: np.ndarray, points: np.ndarray) -> int:

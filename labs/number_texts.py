@@ -1,4 +1,5 @@
-"""Numbers as people type them into tables, tableaus and matrices, read at a bounded cost.
+"""Numbers as people type them into tables, tableaus and matrices, read at a bounded cost; and the
+sign of those they read.
 
 Exact arithmetic would turn the nine letters of 1e9000000 into a number of nine million digits
 first; here a number is a float from the beginning, and its text is short."""
@@ -40,6 +41,17 @@ def plain_text(text: str) -> str:
     return re.sub(r"[ \t]+%", "%", text)
 
 
+def with_minus(text: str) -> str:
+    """A text with the sign of mathematics before its numbers: -8 rad/s is \u22128 rad/s. Hyphens in
+    words (n-step, H-1) and ranges (3-5) remain."""
+    return re.sub(r"(?<![\w)])-(?=\.?\d)|(?<=\de)-(?=\d)", "\u2212", text)
+
+
 def shorten(text: str) -> str:
     """What a refusal repeats of a text."""
     return text if len(text) <= SHOWN else f"{text[: SHOWN - 1]}\u2026"
+
+
+def counted(count: int, noun: str) -> str:
+    """1 sweep, 1,024 sweeps."""
+    return f"{count:,} {noun}" if count == 1 else f"{count:,} {noun}s"

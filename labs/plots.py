@@ -65,7 +65,8 @@ class Trace:
     same x or each over its column of an x of that shape. "marked" is a line with its points.
     Without a label it stays out of the legend; `note` names a field of one number for each curve
     (NaN or none where there is none), that stands behind the label. `series` is its colour, or
-    that of the first curve, 1 to 8, or 0 for ink."""
+    that of the first curve, 1 to 8, or 0 for ink. Of an `optional` one `Lab.fields` leaves x and y
+    out where there never is anything to show: it is not in the legend then."""
 
     x: str
     y: str
@@ -75,6 +76,7 @@ class Trace:
     style: Literal["line", "marked", "points", "dash"] = "line"
     series: int = 0
     note: str = ""
+    optional: bool = False
 
 
 @dataclass(frozen=True, init=False)

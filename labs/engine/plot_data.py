@@ -20,6 +20,7 @@ import numpy as np
 from labs.engine.record import csv_table, versions
 from labs.engine.run import World
 from labs.errors import LabError
+from labs.number_texts import with_minus
 from labs.plots import (
     Bars,
     Card,
@@ -104,9 +105,10 @@ class PlotData:
 
 def named_values(world: World) -> dict[str, np.ndarray | str | tuple[str, ...]]:
     """Fields, notes and labels as they are now: what plots show besides measured channels."""
+    notes = world.lab.notes(world.params, world.state)
     return {
         **world.lab.fields(world.params, world.state),
-        **world.lab.notes(world.params, world.state),
+        **{name: with_minus(text) for name, text in notes.items()},
         **world.lab.labels(world.params),
     }
 
@@ -154,7 +156,8 @@ def _curves(plot: Curves, data: Data) -> Table:
 
 
 def _points(plot: Curves, data: Data, noted: bool) -> Iterable[Sequence[Any]]:
-    for trace in plot.traces:
+    there = (trace for trace in plot.traces if not trace.optional or trace.y in data)
+    for trace in there:
         xs, ys = np.asarray(data[trace.x]), np.asarray(data[trace.y])
         count = ys.shape[1] if ys.ndim == 2 else 1
         notes = np.ravel(data[trace.note]) if trace.note and trace.note in data else ()

@@ -7,6 +7,7 @@ import pickle
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import chain, combinations
 from typing import Any
 
 import numpy as np
@@ -290,16 +291,29 @@ def _without_durations(snapshot: Snapshot | None) -> dict[str, Any]:
 
 @every_lab
 def test_plots_name_real_channels(entry: Entry) -> None:
-    lab = entry.lab
-    world = moved(entry)
+    """Of every plot where it is shown."""
+    unseen = set(range(len(entry.lab.plots)))
+    for world in chain([moved(entry)], (World(entry, changes) for changes in variants(entry))):
+        if not unseen:
+            return
+        params = world.params.model_dump()
+        shown = {i for i in unseen if plots.is_shown(entry.lab.plots[i], params)}
+        check_plots(world, [entry.lab.plots[i] for i in shown])
+        unseen -= shown
+    assert not unseen, [entry.lab.plots[i] for i in unseen]
+
+
+def check_plots(world: World, shown: list[plots.Plot]) -> None:
+    """What they show is there, and of their shapes."""
+    lab = world.lab
     measured = lab.measure(world.params, world.state)
     pictured = lab.fields(world.params, world.state)
     noted = lab.notes(world.params, world.state)
     said = lab.labels(world.params)
     assert len({*noted, *pictured, *said}) == len(noted) + len(pictured) + len(said)
-    for plot in lab.plots:
+    for plot in shown:
         known = noted if isinstance(plot, Note) else pictured
-        assert set(plots.field_names(plot)) <= set(known), plot
+        assert set(plots.field_names(plot)) - optional_fields(plot) <= set(known), plot
         assert set(plots.label_names(plot)) <= {*said, getattr(plot, "select", "")}, plot
         for governor, values in getattr(plot, "when", {}).items():
             tunable = lab.Params.tunables[governor]
@@ -317,7 +331,8 @@ def test_plots_name_real_channels(entry: Entry) -> None:
                     tex(line.symbol)
                 assert unit == unit.strip()
             case Curves(traces=traces, log_x=log_x, log_y=log_y, equal=equal):
-                for trace in traces:
+                there = [t for t in traces if not t.optional or {t.x, t.y} & set(known)]
+                for trace in there:
                     x, y = np.asarray(pictured[trace.x]), np.asarray(pictured[trace.y])
                     assert x.ndim == 1 or x.shape == y.shape, trace
                     assert y.ndim in (1, 2), trace
@@ -333,6 +348,8 @@ def test_plots_name_real_channels(entry: Entry) -> None:
                 labels = [name for trace in traces for name in named(trace)]
                 assert labels or len(traces) == 1, f"{plot}: a legend names what is drawn"
                 assert len(labels) == len(set(labels)), plot
+                pairs = combinations((t for t in there if t.label), 2)
+                assert not [p for p in pairs if set.intersection(*(looks(t, pictured) for t in p))]
                 assert not (equal and (log_x or log_y)), f"{plot}: one scale is linear"
             case HeatMap(x=x, y=y, z=z, arrows=arrows):
                 assert np.shape(pictured[z]) == (len(pictured[y]), len(pictured[x]))
@@ -353,6 +370,20 @@ def test_plots_name_real_channels(entry: Entry) -> None:
             case Readout(channel=channel, label=label):
                 assert label
                 assert np.ndim(measured.get(channel, 0.0)) == 0, "a read-out is one number"
+
+
+def optional_fields(plot: plots.Plot) -> set[str]:
+    """Those a lab may leave out."""
+    traces = plot.traces if isinstance(plot, Curves) else ()
+    return {name for trace in traces if trace.optional for name in (trace.x, trace.y)}
+
+
+def looks(trace: Trace, pictured: Mapping[str, np.ndarray]) -> set[tuple[str, int]]:
+    """What tells its curves from others': style and colour, 0 for ink."""
+    y = np.asarray(pictured[trace.y])
+    curves = y.shape[1] if y.ndim == 2 else 1
+    series = [(trace.series - 1 + k) % 8 + 1 if trace.series else 0 for k in range(curves)]
+    return {(trace.style, k) for k in series}
 
 
 @every_lab
@@ -391,13 +422,16 @@ def named(trace: Trace) -> tuple[str, ...]:
 def test_every_channel_is_measured_somewhere(entry: Entry) -> None:
     """A misspelt one would never show a value, whatever is set."""
     wanted = {name for plot in entry.lab.plots for name in plots.measured(plot)}
+    optional = {name for plot in entry.lab.plots for name in optional_fields(plot)}
+    wanted |= optional
     found: set[str] = set()
     for changes in ({}, *(values for _, values in settings(entry))):
         if wanted <= found:
             break
         world = run(entry.slug, changes, seconds=5.0)
         channels = world.recording().channels
-        found |= {name for name in wanted if np.isfinite(channels[name]).any()}
+        found |= {name for name in wanted - optional if np.isfinite(channels[name]).any()}
+        found |= optional & set(entry.lab.fields(world.params, world.state))
     assert wanted <= found
 
 

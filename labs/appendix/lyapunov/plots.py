@@ -13,19 +13,19 @@ PLOTS = (
     Curves(
         "Distance and its bound",
         "step k",
-        "|x_k| / |x_0|",
+        "|xₖ| / |x₀|",
         Trace("k", "farthest", "farthest run", series=1),
         Trace("k", "median", "median run", series=2),
-        Trace("k_bound", "bound", "c γᵏ", "dash", 0),
+        Trace("k_bound", "bound", "c γᵏ", "dash", optional=True),
         log_y=True,
     ),
     Curves(
         "V along the runs",
         "step k",
-        "V(x_k) / V(x_0)",
+        "V(xₖ) / V(x₀)",
         Trace("k", "V_most", "largest", series=1),
         Trace("k", "V_median", "median", series=2),
-        Trace("k_bound", "V_bound", "(1 − α₃/α₂)ᵏ", "dash", 0),
+        Trace("k_bound", "V_bound", "(1 − α₃/α₂)ᵏ", "dash", optional=True),
         log_y=True,
     ),
     HeatMap(
@@ -60,31 +60,32 @@ TINY = 1e-12
 def run_fields(runs: Runs | None, found: Study | None) -> Mapping[str, np.ndarray]:
     """The runs against what the constants promise."""
     none = np.empty(0)
-    fields = dict.fromkeys(
-        ("k", "farthest", "median", "V_most", "V_median", "k_bound", "bound", "V_bound"), none
-    )
+    fields = dict.fromkeys(("k", "farthest", "median", "V_most", "V_median"), none)
+    fields |= _promised(found)
     if runs is None or found is None or runs.k < 0:
         return fields
     distances, V = (
         np.maximum(some / np.where(some[0] == 0.0, 1.0, some[0]), TINY)
         for some in (runs.distances, runs.V)
     )
-    fields |= {
+    return fields | {
         "k": np.arange(runs.k + 1.0),
         "farthest": distances.max(axis=1),
         "median": np.median(distances, axis=1),
         "V_most": V.max(axis=1),
         "V_median": np.median(V, axis=1),
     }
-    constants = found.constants
-    if constants.holds:
-        rate = 1.0 - constants.alpha_3 / constants.alpha_2
-        fields |= {
-            "k_bound": np.arange(STEPS + 1.0),
-            "bound": constants.bound(STEPS),
-            "V_bound": rate ** np.arange(STEPS + 1.0),
-        }
-    return fields
+
+
+def _promised(found: Study | None) -> dict[str, np.ndarray]:
+    """Not known yet it is empty; where V is no Lyapunov function there is nothing."""
+    if found is None:
+        return dict.fromkeys(("k_bound", "bound", "V_bound"), np.empty(0))
+    constants, k = found.constants, np.arange(STEPS + 1.0)
+    if not constants.holds:
+        return {}
+    rate = 1.0 - constants.alpha_3 / constants.alpha_2
+    return {"k_bound": k, "bound": constants.bound(STEPS), "V_bound": rate**k}
 
 
 def map_fields(params: LyapunovParams, found: Study | None) -> Mapping[str, np.ndarray]:
@@ -122,7 +123,7 @@ def conditions(params: LyapunovParams, found: Study | None, failure: str) -> str
         + (f"holds, α₃ = {a.alpha_3:.3g}." if a.alpha_3 > 0.0 else _fails(a.alpha_3)),
     ]
     if a.holds:
-        lines.append(f"So |x_k| ≤ c γᵏ |x₀| with c = {a.c:.3g}, γ = {a.gamma:.4f}.")
+        lines.append(f"So |xₖ| ≤ c γᵏ |x₀| with c = {a.c:.3g}, γ = {a.gamma:.4f}.")
     return "\n".join(lines)
 
 

@@ -20,8 +20,8 @@ PLOTS: tuple[Plot, ...] = (
         "steps of a learner",
         "J",
         Trace("tried", "greedy", "learner {}", series=1),
-        Trace("compared_x", "table_y", "optimal table", "dash"),
-        Trace("compared_x", "energy_y", "energy, then LQR", "dash", series=5),
+        Trace("compared_x", "table_y", "optimal table", "dash", optional=True),
+        Trace("compared_x", "energy_y", "energy, then LQR", "dash", series=5, optional=True),
         log_y=True,
     ),
     HeatMap("Value and policy", "x", "y", "value", *AXES, "min Q", arrows="policy"),
@@ -129,9 +129,7 @@ def curves(
     they are compared with."""
     tried, online = training["tried"], training["online"].T
     begun = (online != UNKNOWN).all(axis=1)
-    table, energy = compared or (0.0, 0.0)
-    ends = tried[[0, -1]] if compared and len(tried) else np.zeros(0)
-    return {
+    found = {
         "tried": tried,
         "greedy": training["greedy"].T,
         "td_error": training["td_error"].T,
@@ -141,7 +139,9 @@ def curves(
         "paid": training["paid_greedy"][s],
         "loss": training["loss"][s],
         "gradient_norm": training["gradient_norm"][s],
-        "compared_x": ends,
-        "table_y": np.full(len(ends), table),
-        "energy_y": np.full(len(ends), energy),
     }
+    if compared is not None:
+        ends = tried[[0, -1]] if len(tried) else np.zeros(0)
+        table, energy = (np.full(len(ends), cost) for cost in compared)
+        found |= {"compared_x": ends, "table_y": table, "energy_y": energy}
+    return found

@@ -63,9 +63,11 @@ class Predicted:
         found = {"steps": training["steps"]} | spread("error", training["error"])
         best, fixed = given.best_error, given.fixed_error
         found |= over_all(training, reference_best=best, reference_fixed=fixed)
-        if training["squares"].size and len(training["steps"]) > 1:
-            found["squares_x"] = training["steps"][[0, -1]]
-            found["squares"] = np.full(2, training["squares"].mean())
+        if params.data != "latest":
+            known = training["squares"].size and len(training["steps"]) > 1
+            ends = training["steps"][[0, -1]] if known else np.zeros(0)
+            level = training["squares"].mean() if known else 0.0
+            found |= {"squares_x": ends, "squares": np.full(len(ends), level)}
         v = given.values(training["w"][params.shown])
         if params.world == "surface":
             return found | _maps(params, given.features, v, given.task.truth)

@@ -16,7 +16,7 @@ from labs.reinforcement_learning.function_approximation.params import (
     ITERATIONS,
     ApproximationParams,
 )
-from labs.reinforcement_learning.function_approximation.plots import PLOTS, completed
+from labs.reinforcement_learning.function_approximation.plots import PLOTS
 from labs.reinforcement_learning.function_approximation.subject import Subject, Training
 from labs.scene import Scene
 
@@ -114,7 +114,7 @@ class FunctionApproximation(Lab[ApproximationParams, ApproximationState]):
     def fields(
         self, params: ApproximationParams, state: ApproximationState
     ) -> Mapping[str, np.ndarray]:
-        return completed(SUBJECTS[params.world].fields(params, state.training))
+        return SUBJECTS[params.world].fields(params, state.training)
 
     def labels(self, params: ApproximationParams) -> Mapping[str, str | tuple[str, ...]]:
         return {"unit": _unit(params)}

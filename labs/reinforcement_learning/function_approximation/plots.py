@@ -53,7 +53,7 @@ PLOTS: tuple[Plot, ...] = (
         *_band("error", "mean of six"),
         Trace("reference_x", "reference_best", "best fit", "dash", series=3),
         Trace("reference_x", "reference_fixed", "TD fixed point", "dash", series=2),
-        Trace("squares_x", "squares", "least squares of the batch", "dash"),
+        Trace("squares_x", "squares", "least squares of the batch", "dash", optional=True),
         log_y=True,
         when=GIVEN,
     ),
@@ -143,23 +143,6 @@ PLOTS: tuple[Plot, ...] = (
 )
 
 
-def completed(found: Fields) -> Fields:
-    """With zeros for the plots that only other worlds have."""
-    for plot in PLOTS:
-        if isinstance(plot, HeatMap) and plot.z not in found:
-            axes = {plot.x: np.zeros(1), plot.y: np.zeros(1)} | found
-            found = axes | {plot.z: np.zeros((len(axes[plot.y]), len(axes[plot.x])))}
-        if isinstance(plot, HeatMap) and plot.arrows:
-            found = {plot.arrows: np.zeros((0, 4))} | found
-        if isinstance(plot, Curves):
-            for trace in plot.traces:
-                x = found.get(trace.x, np.zeros(0))
-                names = trace.label if isinstance(trace.label, tuple) else ()
-                y = np.zeros((len(x), len(names))) if names else np.zeros(len(x))
-                found = {trace.x: x, trace.y: y} | found
-    return found
-
-
 def spread(name: str, curves: np.ndarray, middle: str = "mean") -> Fields:
     """The middle of S curves (S, k), the least and the largest."""
     center = np.median(curves, axis=0) if middle == "median" else curves.mean(axis=0)
@@ -168,8 +151,6 @@ def spread(name: str, curves: np.ndarray, middle: str = "mean") -> Fields:
 
 def over_all(training: Training, **levels: float) -> Fields:
     """Horizontal lines at some levels, from the first to the last of the steps."""
-    steps = training["steps"]
-    if not len(steps):
-        return {}
-    lines = {name: np.full(2, level) for name, level in levels.items()}
-    return {"reference_x": steps[[0, -1]]} | lines
+    ends = training["steps"]
+    ends = ends[[0, -1]] if len(ends) else ends
+    return {"reference_x": ends} | {name: np.full(len(ends), at) for name, at in levels.items()}

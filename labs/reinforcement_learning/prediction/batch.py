@@ -29,6 +29,7 @@ from labs.algorithms.batch_prediction import (
     td_sweep,
 )
 from labs.lab import Snapshot
+from labs.number_texts import counted
 from labs.problems.prediction import root_mean_square_error
 from labs.reinforcement_learning.prediction.params import PredictionParams
 from labs.reinforcement_learning.prediction.worlds import LEARNERS
@@ -94,11 +95,11 @@ def learn(params: PredictionParams, training: Training) -> Iterator[Snapshot]:
             "left": np.concatenate([found["left"], left[:, None]], axis=1),
         }
         found |= _judged(batch, V, first)
-        done = ""
+        done, spent = "", counted(sweeps, "sweep")
         if worst <= CLOSE:
-            done = f"Both settled after {sweeps} sweeps over {size} episodes."
+            done = f"Both settled after {spent} over {counted(size, 'episode')}."
         elif sweeps >= ITERATIONS * stride:
-            done = f"After {sweeps} sweeps they are still up to {worst:.2g} from their answers."
+            done = f"After {spent} they are still up to {worst:.2g} from their answers."
         yield Snapshot(
             i, dict(found), done, 1.0 if done else 0.5 + 0.5 * sweeps / ITERATIONS / stride
         )

@@ -19,7 +19,6 @@ from labs.reinforcement_learning.prediction.picture import (
     draw_world,
 )
 from labs.reinforcement_learning.prediction.plots import (
-    NOTHING,
     PLOTS,
     batch_curves,
     corner_curves,
@@ -140,13 +139,12 @@ class Prediction(Lab[PredictionParams, PredictionState]):
     def fields(self, params: PredictionParams, state: PredictionState) -> Mapping[str, np.ndarray]:
         training, world = state.training, params.prediction
         if params.study == "corners":
-            return {**NOTHING, **corner_curves(training, world.truth)}
+            return corner_curves(training, world.truth)
         if params.study == "batch":
             truth = None if params.data == "predictor" else world.truth
-            return {**NOTHING, **batch_curves(training, truth)}
+            return batch_curves(training, truth)
         V, spread = _shown(params, state)
         return {
-            **NOTHING,
             **error_curves(training),
             **estimate_curves(world, V, spread),
             **target_curves(world, params.looked_at, V[1], state.random),

@@ -17,6 +17,7 @@ import numpy as np
 
 from labs.algorithms.prediction import EVERY_VISIT, FIRST_VISIT, TD0, Predictors, init, step
 from labs.lab import Snapshot
+from labs.number_texts import counted
 from labs.reinforcement_learning.prediction.params import PredictionParams
 from labs.reinforcement_learning.prediction.worlds import PredictionWorld
 
@@ -51,7 +52,9 @@ def learn(params: PredictionParams, training: Training) -> Iterator[Snapshot]:
         batch = _batch_size(params, training, -(-wanted // BATCHES))
         batch = min(batch, wanted - learned)
         training, i, learned = _train(params, training, batch), i + 1, learned + batch
-        done = f"{episodes_done(training)} episodes learned." if learned == wanted else ""
+        done = (
+            f"{counted(episodes_done(training), 'episode')} learned." if learned == wanted else ""
+        )
         yield Snapshot(i, training, done, learned / wanted)
 
 

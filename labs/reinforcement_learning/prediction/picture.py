@@ -148,7 +148,7 @@ def draw_corners(scene: Scene, world: PredictionWorld, live: Live, V: np.ndarray
         corner = np.array([(c % 2 - 0.5) * APART[0], 0.0, (0.5 - c // 2) * APART[1] + 0.7])
         _draw_diagram(scene, name, corner, seen.astype(float), end, bootstraps=c % 2 == 1)
         of = int(x) if c % 2 else root
-        text = f"{name}: V({state_names(place)[of - 1]}) = {V[c, of]:.2f}".replace("-", "−")
+        text = f"{name}: V({state_names(place)[of - 1]}) = {V[c, of]:.2f}"
         scene.label(name, text, corner + np.array([0.0, 0.0, 0.1]))
     for text, where in TABLE.items():
         scene.label(text, text, where)

@@ -5,16 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from labs.plots import (
-    Curves,
-    HeatMap,
-    Line,
-    Plot,
-    Readout,
-    TimeSeries,
-    Trace,
-    field_names,
-)
+from labs.plots import Curves, HeatMap, Line, Plot, Readout, TimeSeries, Trace
 from labs.reinforcement_learning.prediction.corners import CORNERS
 from labs.reinforcement_learning.prediction.params import METHODS
 from labs.reinforcement_learning.prediction.targets import sample_targets
@@ -56,8 +47,11 @@ PLOTS: tuple[Plot, ...] = (
         "V",
         Trace("along", "true_V", "truth", "points"),
         *_both("along", "estimate"),
-        *(Trace("beside", f"{edge}_mc", "", "dash", 1) for edge in ("low", "high")),
-        *(Trace("beside", f"{edge}_td", "", "dash", 2) for edge in ("low", "high")),
+        *(
+            Trace("beside", f"{edge}_{short}", "", "dash", i, optional=True)
+            for i, short in enumerate(METHODS, 1)
+            for edge in ("low", "high")
+        ),
         when=ONLINE,
     ),
     Curves(
@@ -94,7 +88,7 @@ PLOTS: tuple[Plot, ...] = (
         *_both("cells", "batch"),
         Trace("cells", "least_squares", "least squares", "points", 1),
         Trace("cells", "certainty", "certainty equivalence", "points", 2),
-        Trace("batch_cells", "batch_truth", "truth", "dash"),
+        Trace("batch_cells", "batch_truth", "truth", "dash", optional=True),
         when=BATCH,
     ),
     Curves(
@@ -143,14 +137,6 @@ PLOTS: tuple[Plot, ...] = (
         for i, c in enumerate(CORNERS)
     ),
 )
-_SHAPES: Mapping[str, tuple[int, int]] = {
-    **{plot.z: (0, 0) for plot in PLOTS if isinstance(plot, HeatMap)},
-    **dict.fromkeys(("looked", "corner_error", "corner_V"), (0, len(CORNERS))),
-}
-NOTHING: Mapping[str, np.ndarray] = {
-    name: np.zeros(_SHAPES.get(name, (0,))) for plot in PLOTS for name in field_names(plot)
-}
-"""All fields, of what is not shown."""
 
 
 def error_curves(training: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -215,16 +201,15 @@ def batch_curves(
     inner = slice(1, -1)
     V, answers = training["V"][:, 0, inner], training["answers"][:, 0, inner]
     cells = np.arange(1.0, V.shape[1] + 1)
-    known = truth is not None
     found = {
         "cells": cells,
         "least_squares": answers[0],
         "certainty": answers[1],
-        "batch_cells": cells if known else cells[:0],
-        "batch_truth": truth[inner] if truth is not None else cells[:0],
         "sizes": training["sizes"],
         "sweeps": training["sweeps"],
     }
+    if truth is not None:
+        found |= {"batch_cells": cells, "batch_truth": truth[inner]}
     for m, short in enumerate(METHODS):
         found[f"batch_{short}"] = V[m]
         found[f"answer_{short}"] = training["error"][m]

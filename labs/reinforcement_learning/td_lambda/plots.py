@@ -69,7 +69,7 @@ PLOTS: tuple[Plot, ...] = (
         "largest |ΔV|",
         Trace("gap_ends", "largest", "largest true value", "dash"),
         Trace("episodes", "gaps", "difference", "marked", series=1),
-        Trace("gap_ends", "rounding", "rounding", "dash"),
+        Trace("gap_ends", "rounding", "rounding", "dash", series=2),
         log_y=True,
         when=SECOND,
     ),

@@ -88,7 +88,7 @@ def draw_walk(
     for name, cell in zip(state_names(walk)[::every], places[1:-1:every], strict=True):
         scene.label(f"state {name}", name, cell + front)
     for side, end, cost in zip(("left", "right"), (0, -1), ends, strict=True):
-        scene.label(f"{side} end", f"{cost:g}".replace("-", "−"), places[end] + front)
+        scene.label(f"{side} end", f"{cost:g}", places[end] + front)
     if place is not None:
         x = float(np.interp(place, np.arange(n + 2), places[:, 0]))
         radius = 0.28 * size

@@ -25,8 +25,9 @@ export class Curves {
     this.yLabel = fill(this.plot.y_label, fields);
     // A logarithm has no place for what is negative: the axis is then linear.
     const negative = ({ y }) => (fields[y] ?? []).flat().some((v) => v < 0);
-    this.logY = this.plot.log_y && !this.plot.traces.some(negative);
-    this.curves = this.plot.traces.flatMap((trace) => this.expand(trace, fields));
+    const traces = this.plot.traces.filter(({ optional, y }) => !optional || y in fields);
+    this.logY = this.plot.log_y && !traces.some(negative);
+    this.curves = traces.flatMap((trace) => this.expand(trace, fields));
     this.marked = new Set(this.curves.map(({ series }) => series).filter(Boolean)).size > 1;
     this.updateLegend();
     this.draw();

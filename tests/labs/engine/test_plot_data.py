@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from labs.engine.headless import run
-from labs.engine.plot_data import PlotData, file_name
+from labs.engine.plot_data import PlotData, _points, file_name, named_values
 from labs.engine.run import World
 from labs.errors import LabError
-from labs.plots import is_shown
+from labs.plots import Curves, Trace, is_shown
 
 
 def table(world: World, title: str) -> tuple[list[str], list[list[str]]]:
@@ -98,6 +98,23 @@ def test_matrices_bars_and_notes(oscillator: World) -> None:
         np.testing.assert_array_equal(column(rows, k), fields[name])
     header, rows = table(oscillator, "Note")
     assert (header, rows[-1]) == (["text"], ["It swings."])
+
+
+def test_numbers_in_notes_have_the_sign_of_mathematics(
+    oscillator: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said = {"side": "At most -8 rad/s."}
+    monkeypatch.setattr(type(oscillator.lab), "notes", lambda *_: said)
+    assert named_values(oscillator)["side"] == "At most \u22128 rad/s."
+
+
+def test_a_curve_that_is_left_out_is_not_in_the_table() -> None:
+    curves = Curves(
+        "Cost", "k", "J", Trace("k", "J", "J"), Trace("k", "bound", "bound", optional=True)
+    )
+    data = {"k": np.arange(2.0), "J": np.ones(2)}
+    assert [row[0] for row in _points(curves, data, False)] == ["J", "J"]
+    assert len(list(_points(curves, data | {"bound": np.ones(2)}, False))) == 4
 
 
 def test_json_has_all_with_what_it_belongs_to(grid: World) -> None:

@@ -1,10 +1,10 @@
-"""Numbers as people type them."""
+"""Numbers as people type and read them."""
 
 import pytest
 
 from labs.algorithms.butcher_tableau import parse_tableau
 from labs.errors import LabError
-from labs.number_texts import LONGEST_NUMBER, parse_number, plain_text
+from labs.number_texts import LONGEST_NUMBER, counted, parse_number, plain_text, with_minus
 from labs.reinforcement_learning.markov.chains import parse_rows
 from labs.tasks.mdp_table.table import parse_table
 
@@ -63,3 +63,28 @@ def test_no_text_of_a_lab_is_read_at_unbounded_cost(number: str) -> None:
         parse_table(f'[{{"state": "A", "cost": "{number}", "to": {{"A": 1}}}}]')
     with pytest.raises(LabError):
         parse_rows(f"1: {number} {number}")
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("v = -8 rad/s", "v = \u22128 rad/s"),
+        ("-1", "\u22121"),
+        ("(-.5, 2)", "(\u2212.5, 2)"),
+        ("at most 1e-05", "at most 1e\u221205"),
+        ("n-step, from 3-5 on", "n-step, from 3-5 on"),
+        ("column-2", "column-2"),
+    ],
+)
+def test_numbers_have_the_sign_of_mathematics(text: str, shown: str) -> None:
+    assert with_minus(text) == shown
+
+
+def test_one_is_no_plural() -> None:
+    counts = (0, 1, 2, 1024)
+    assert [counted(n, "sweep") for n in counts] == [
+        "0 sweeps",
+        "1 sweep",
+        "2 sweeps",
+        "1,024 sweeps",
+    ]

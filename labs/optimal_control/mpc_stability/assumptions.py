@@ -136,9 +136,9 @@ def sentences(formulation: Formulation) -> str:
     found = check(formulation)
     marks = ["✓" if holds else "✗" for holds in found.hold]
     size = f"of area {found.terminal_area:.3g}" if found.hold[1] else "unbounded"
-    three = f"worst l_f(x⁺) - l_f(x) + l(x, u): {_number(found.decrease)}"
+    three = f"Change of the terminal cost in a step, plus l: at most {_number(found.decrease)}"
     if found.invariance > 0.0:
-        three = f"no u leads into X_f from {found.invariance:.0%} of it"
+        three = f"From {found.invariance:.0%} of the terminal set no u leads into it"
     bound = f"l ≥ {_number(found.stage_bound)} |x|²"
     if found.stage_bound < 0.0:
         bound = f"l(0, u) ≥ {found.stage_bound:.3g}"
@@ -146,10 +146,10 @@ def sentences(formulation: Formulation) -> str:
         "All hold: V* is a Lyapunov function on X₀."
         if all(found.hold)
         else "Not all hold: nothing is promised.",
-        f"{marks[0]} 1. At the origin f, l and l_f are {_number(found.at_origin)}.",
-        f"{marks[1]} 2. X × U is closed; X_f is {size}.",
+        f"{marks[0]} 1. At the origin f, l and the terminal cost are {_number(found.at_origin)}.",
+        f"{marks[1]} 2. X × U is closed; the terminal set is {size}.",
         f"{marks[2]} 3a. {three}.",
-        f"{marks[3]} 3b. {bound}; l_f ≤ {_number(found.terminal_bound)} |x|².",
+        f"{marks[3]} 3b. {bound}; terminal cost ≤ {_number(found.terminal_bound)} |x|².",
     ]
     return "\n".join(lines)
 

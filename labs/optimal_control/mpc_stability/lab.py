@@ -8,6 +8,7 @@ import numpy as np
 
 from labs.algorithms.polygons import area
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
+from labs.number_texts import counted
 from labs.optimal_control.mpc_stability import closed_loop, picture
 from labs.optimal_control.mpc_stability.assumptions import sentences
 from labs.optimal_control.mpc_stability.closed_loop import Run
@@ -215,5 +216,5 @@ def _account(run: Run) -> str:
         return "\n".join(filter(None, [run.controller.status, run.ended]))
     count = run.controller.failures
     plans = run.controller.period - count
-    said = f"{plans} plans, each solved to optimality."
-    return said if not count else f"{said} In {count} periods there was none."
+    said = f"{counted(plans, 'plan')}, each solved to optimality."
+    return said if not count else f"{said} In {counted(count, 'period')} there was none."

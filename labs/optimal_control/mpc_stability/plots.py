@@ -18,7 +18,7 @@ PLOTS: tuple[Plot, ...] = (
         "period",
         "V*",
         Trace("k", "V_run", "V*", "marked", 1),
-        Trace("k", "V_promised", "V*(x₀) - Σ l", "dash", 2),
+        Trace("k", "V_promised", "V*(x₀) − Σ l", "dash", 2),
     ),
     TimeSeries(
         "Change of the value",
@@ -40,11 +40,16 @@ PLOTS: tuple[Plot, ...] = (
     TimeSeries("Value", "", Line("V", "V^*_N")),
     Note("The run", "run"),
     Readout("V", "V*", ""),
-    Readout("worst", "Worst V*(x⁺) - V* + l", ""),
+    Readout("worst", "Worst V*(x⁺) − V* + l", ""),
     Readout("falls", "V* falls by l on", "% of X₀", when=AT_REST),
     Readout("rises", "V* rises on", "% of X₀", when=AT_REST),
     Readout("area", "X₀", "{area_unit}", when=AT_REST),
-    Readout("terminal_area", "X_f", "{area_unit}", when={"terminal_set": ("origin", "invariant")}),
+    Readout(
+        "terminal_area",
+        "Terminal set",
+        "{area_unit}",
+        when={"terminal_set": ("origin", "invariant")},
+    ),
 )
 
 

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
+from labs.number_texts import counted
 from labs.params import Value
 from labs.reinforcement_learning.dynamic_programming.follower import (
     PERIOD,
@@ -244,7 +245,7 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         place, (V, policy) = state.tabular_task.place, _shown(params, state)
         about = mdp.report([state.tabular_task.start])
         if mdp.terminal.any() and not mdp.can_end.all():
-            about += f"\nFrom {int((~mdp.can_end).sum())} states no way leads to a goal."
+            about += f"\nFrom {counted(int((~mdp.can_end).sum()), 'state')} no way leads to a goal."
         by_state = UNNAMED
         if isinstance(place, CellWorld):
             about = "\n".join([about, *place.notes])

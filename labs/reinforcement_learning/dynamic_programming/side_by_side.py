@@ -19,6 +19,7 @@ import numpy as np
 
 from labs.algorithms import policy_evaluation, policy_iteration, value_iteration
 from labs.algorithms.bellman import NO_BOUND, Sweep, unbounded_message
+from labs.number_texts import counted
 from labs.problems.finite_mdp import FiniteMDP, random_policy
 from labs.rounding import round_up
 
@@ -247,7 +248,8 @@ def iteration_report(at: Iterates, seconds: Mapping[str, object]) -> str:
         spent = seconds.get(method)
         took = f", {1e3 * spent:.3g} ms" if isinstance(spent, float) and spent else ""
         lines.append(
-            f"{name}: {int(at.count[i]):,} sweeps, {int(at.backups[-1, i]):,} backups{took}. "
+            f"{name}: {counted(int(at.count[i]), 'sweep')}, "
+            f"{counted(int(at.backups[-1, i]), 'backup')}{took}. "
             f"{at.done[i] or 'On its way.'}"
         )
     return "\n".join(lines)

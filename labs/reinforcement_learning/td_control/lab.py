@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
+from labs.number_texts import counted
 from labs.params import Value
 from labs.random_numbers import seeded, uniform
 from labs.reinforcement_learning.td_control.greedy_walk import (
@@ -136,7 +137,8 @@ class TdControl(Lab[TdParams, TdState]):
             if not training["sound"]:
                 done = "The estimates diverged."
             elif left == episodes:
-                done = f"{episodes_done(training)} episodes learned. {task.without_optimum}".strip()
+                learned = f"{counted(episodes_done(training), 'episode')} learned."
+                done = f"{learned} {task.without_optimum}".strip()
             yield Snapshot(i, training, done, 1.0 - (left - episodes) / wanted)
 
     def accept(self, params: TdParams, state: TdState, snapshot: Snapshot) -> TdState:

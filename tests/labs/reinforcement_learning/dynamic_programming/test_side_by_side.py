@@ -114,7 +114,8 @@ def test_an_iteration_without_end_is_given_up(monkeypatch: pytest.MonkeyPatch) -
 def test_what_each_took_is_told() -> None:
     mdp, at, limits = race()
     assert iteration_report(at, {}).count("0 sweeps, 0 backups. On its way.") == 4
-    *_, (last, _) = passes(mdp, at, SETTINGS, limits)
+    (first, _), *_, (last, _) = passes(mdp, at, SETTINGS, limits)
+    assert "Value iteration: 1 sweep, " in iteration_report(first, {})
     lines = iteration_report(last, {"value": 0.0123}).splitlines()
     assert lines[3].startswith(f"Value iteration: {last.count[3]} sweeps, ")
     assert " backups, 12.3 ms. " in lines[3]

@@ -13,6 +13,7 @@ PROBLEM = Group("Problem", effect="solve")
 INFEASIBLE = Group("When infeasible")
 SCENE = Group("Scene")
 
+PERIODS = {0.05: "50 ms", 0.1: "100 ms", 0.2: "200 ms"}
 Units = Mapping[str, Mapping[Value, str]]
 POSITION: Units = {"system": {"unstable": "× 0.5 rad", "joint": "× 1.2 rad"}}
 VELOCITY: Units = {"system": {"unstable": "× 3 rad/s", "joint": "× 4 rad/s"}}
@@ -34,7 +35,7 @@ class MpcFeasibilityParams(Params):
         key=True,
     )
     """What is controlled: its linear model, which is exact for the cart."""
-    period: float = SYSTEM.choice(0.1, {0.05: "0.05", 0.1: "0.1", 0.2: "0.2"}, "Period", "T", "s")
+    period: float = SYSTEM.choice(0.1, PERIODS, "Period", "T", "s")
     """A control is held for so long, and a plan is made as often."""
     x1: float = START.knob(
         -0.8, -1.25, 1.25, "x_1", "m", "Start position", step=0.01, units=POSITION, key=True

@@ -13,6 +13,8 @@ RING, DEEP = 1.25, 0.75
 """[m] half axes of the ring of states on the floor."""
 SIZE = 0.11
 """[m] a value of ten on the floor of the spiral."""
+ROOM, LOWEST = 0.08, np.array([0.0, 0.0, 0.4])
+"""[m] kept in view around states and names, and above their middle at least."""
 REACH = 20.0
 """The values of the spiral that are in view."""
 
@@ -31,17 +33,19 @@ def draw_states(
     ways: tuple[tuple[int, int], ...],
 ) -> None:
     """`values` (X,) at `places` (X, 2) [m], the walker at a state, labels, arrows."""
-    scene.camera((0.0, -3.6, 1.9), (0.0, 0.0, 0.45), _around(places))
-    for x, (value, (east, north)) in enumerate(zip(values, places, strict=True)):
-        z = height(float(value))
-        foot = np.array([east, north, 0.0])
-        top = foot + np.array([0.0, 0.0, z])
+    feet = np.column_stack([places, np.zeros(len(places))])
+    tops = np.column_stack([places, [height(float(value)) for value in values]])
+    names = feet + np.array([0.0, -0.2, -0.08])
+    corners = np.array([*feet, *tops, *names, feet.mean(axis=0) + LOWEST])
+    around = np.concatenate([corners - ROOM, corners + ROOM])
+    scene.camera((0.0, -3.6, 1.9), (0.0, 0.0, 0.45), around)
+    for x, (foot, top) in enumerate(zip(feet, tops, strict=True)):
         scene.dots(f"foot {x + 1}", foot[None], 0.09, "muted")
-        if abs(z) > 1e-3:
+        if abs(top[2]) > 1e-3:
             scene.trail(f"column {x + 1}", np.stack([foot, top]), "actual")
         color: Color = "warning" if x == at else "actual"
         scene.sphere(f"value {x + 1}", top, 0.075, color)
-        scene.label(f"name {x + 1}", formulas[x], foot + np.array([0.0, -0.2, -0.08]))
+        scene.label(f"name {x + 1}", formulas[x], names[x])
     for i, (x, y) in enumerate(ways):
         start, end = (np.array([*places[z], 0.0]) for z in (x, y))
         way = (end - start) / np.linalg.norm(end - start)
@@ -83,8 +87,3 @@ def _on_floor(w: np.ndarray) -> np.ndarray:
     size = np.hypot(across, up)
     scale = np.where(size > 0.0, 0.35 * np.log1p(size / 4.0) / np.maximum(size, 1e-12), 0.0)
     return np.stack([scale * across, scale * up, np.zeros(len(values))], axis=1)
-
-
-def _around(places: np.ndarray) -> np.ndarray:
-    low, high = places.min(axis=0), places.max(axis=0)
-    return np.array([[*low, 0.0], [*high, 0.0], [*high, 1.2], [*low, 1.2]])

@@ -18,7 +18,7 @@ FOV = np.radians(35.0)
 PANEL, BUTTONS, SHEET, MARGIN = 46, 24, 44, 12
 """[px] that the folded panel takes on the right, the buttons at the bottom, both at the bottom of a
 narrow window, and air around."""
-NARROW, UPRIGHT = 1.5, 350
+NARROW, UPRIGHT = 1.5, 300
 """Width over height of a narrow window, a phone's, and its height [px]."""
 LOWEST, HIGHEST = 270, 450
 """[px] A viewer tells the size of what it draws on, which may be finer than its screen, or coarser

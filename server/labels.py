@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import viser
 
+from labs.number_texts import with_minus
 from server.camera import Cameras
 from server.nodes import Node
 
@@ -22,14 +23,18 @@ ANCHORS: dict[str, tuple[float, float]] = {
 """Which part of a text stands on its point, the best first, and where that puts its middle: in half
 widths and heights, to the right and up."""
 ABOVE = next(iter(ANCHORS))
+SPAN = np.array([[-1.0], [1.0]])
+"""From the middle of a box to its lower left and its upper right corner, in half widths."""
 CHARACTER, LINE = 7.0, 18.0
 """[px] the width of a character, and the height of a line."""
 MOVED, WORSE = 3.0, 0.5
 """What it costs a label to change its place, and to take the next best one."""
 ROOM = 6.0
 """[px] A label goes back to a better place, at no cost, once nothing is so near."""
-COVERED = 40.0
+COVERED = 200.0
 """What it costs to stand wholly on another label; a point of a robot costs 1."""
+GAP = np.array([4.0, 0.0])
+"""[px] kept between two labels side by side: two numbers are not to read as one."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +55,8 @@ class LabelNode(Node):
 
     def write(self, text: str, point: np.ndarray) -> None:
         """What it says, and of which point (3,) [m]."""
-        self.text, self.point = text, point
-        self.send("text", text)
+        self.text, self.point = with_minus(text), point
+        self.send("text", self.text)
         self.place(point)
 
 
@@ -77,13 +82,12 @@ def arrange(labels: list[Label], obstacles: np.ndarray) -> list[str]:
         size = np.array([CHARACTER * len(label.text) + 8.0, LINE])
 
         boxes = {
-            anchor: label.point + 0.5 * size * (np.array(side) + [[-1.0], [1.0]])
-            for anchor, side in ANCHORS.items()
+            anchor: label.point + 0.5 * size * (side + SPAN) for anchor, side in ANCHORS.items()
         }
         now = list(ANCHORS).index(label.anchor)
         costs = {}
         for rank, (anchor, box) in enumerate(boxes.items()):
-            returns = rank < now and not _trouble(box + [[-ROOM], [ROOM]], obstacles, taken)
+            returns = rank < now and not _trouble(box + ROOM * SPAN, obstacles, taken)
             moved = MOVED * (rank != now and not returns)
             costs[anchor] = WORSE * rank + moved + _trouble(box, obstacles, taken)
         best = min(costs, key=costs.__getitem__)
@@ -94,7 +98,9 @@ def arrange(labels: list[Label], obstacles: np.ndarray) -> list[str]:
 
 def _trouble(box: np.ndarray, obstacles: np.ndarray, taken: list[np.ndarray]) -> float:
     """What it costs to stand in a box, for what is there already."""
-    return _inside(box, obstacles) + COVERED * sum(_overlap(box, other) for other in taken)
+    return _inside(box, obstacles) + COVERED * sum(
+        _overlap(box + GAP * SPAN, other) for other in taken
+    )
 
 
 def _inside(box: np.ndarray, points: np.ndarray) -> int:

@@ -1,9 +1,12 @@
 """Labels stand beside what they name, and beside each other."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
-from server.labels import ABOVE, ANCHORS, LINE, ROOM, Label, arrange
+from server.labels import ABOVE, ANCHORS, LINE, ROOM, Label, LabelNode, arrange
 
 NOTHING = np.empty((0, 2))
 
@@ -43,3 +46,10 @@ def test_a_label_pushed_aside_by_another_returns_when_that_is_gone() -> None:
     assert arrange([one, Label("2", np.zeros(2), pushed)], NOTHING) == [ABOVE, pushed]
     far = Label("1", np.array([200.0, 0.0]))
     assert arrange([far, Label("2", np.zeros(2), pushed)], NOTHING) == [ABOVE, ABOVE]
+
+
+def test_a_number_in_a_label_has_the_sign_of_mathematics() -> None:
+    handle = SimpleNamespace()
+    server: Any = SimpleNamespace(scene=SimpleNamespace(add_label=lambda *_, **__: handle))
+    LabelNode(server, "label", "").write("v = -8 rad/s", np.zeros(3))
+    assert handle.text == "v = \u22128 rad/s"

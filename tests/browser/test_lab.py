@@ -331,7 +331,7 @@ def test_curves_are_named_and_can_be_hidden(page: Page) -> None:
     expect(chart.locator("polyline")).to_have_count(1)
 
 
-def test_a_legend_names_what_is_there_and_what_has_no_curve_is_faint(page: Page) -> None:
+def test_a_legend_names_what_can_be_there_and_what_has_no_curve_is_faint(page: Page) -> None:
     lab = LabPage(page, scene=False).open("lqr-tracking", "?robot=cart-pole")
     legend = lab.pin("Affine term over the preview").locator(".legend")
     expect(legend.locator("button")).to_have_text(["k, motor 1"])
@@ -339,6 +339,9 @@ def test_a_legend_names_what_is_there_and_what_has_no_curve_is_faint(page: Page)
     legend = lab.pin("Cost-to-go of the start by the time to go").locator(".legend")
     expect(legend.locator("button")).to_have_count(3)
     expect(legend.locator("button.nothing")).to_have_text(["infinite horizon"])
+    lab.open("function-approximation", "?world=walk")  # without a batch there are no least squares
+    legend = lab.pin("Value error").locator(".legend")
+    expect(legend.locator("button")).to_have_text(["mean of six", "best fit", "TD fixed point"])
 
 
 def test_a_text_is_edited_and_a_wrong_one_stays_to_be_put_right(page: Page) -> None:

@@ -32,19 +32,19 @@ PLOTS: tuple[Plot, ...] = (
     _curves(
         "Position",
         "t", "q", "t [s]", "q [{unit}]",
-        Trace("tail_t", "tail_q", "tail", "dash"),
+        Trace("tail_t", "tail_q", "tail", "dash", optional=True),
         _NOW,
     ),
     _curves("Control", "t", "u", "t [s]", "u [{control_unit}]"),
     _curves(
         "Costate of q",
         "t", "p_q", "t [s]", "∂J/∂q",
-        Trace("exact_t", "exact_p_q", "exact", "dash"),
+        Trace("exact_t", "exact_p_q", "exact", "dash", optional=True),
     ),
     _curves(
         "Costate of v",
         "t", "p_v", "t [s]", "∂J/∂v",
-        Trace("exact_t", "exact_p_v", "exact", "dash"),
+        Trace("exact_t", "exact_p_v", "exact", "dash", optional=True),
     ),
     Bars(
         "Cost: paid, and promised by the tables",
@@ -99,17 +99,15 @@ def motion_fields(params: FamiliesParams, at: Results, now: float) -> dict[str, 
         fields[f"q_{name}"], fields[f"v_{name}"] = motion.X[some].T
         fields[f"p_q_{name}"], fields[f"p_v_{name}"] = P[some].T
     known = [motion for motion in at.motions.values() if motion.known]
-    tail = at.tail if at.tail.converged and params.moment else None
+    if params.moment:
+        some = slice(None if at.tail.converged else 0)
+        fields |= {"tail_t": at.tail.t[some], "tail_q": at.tail.X[some, 0]}
     exact = closed_form(params, params.x0, params.horizon)
+    if exact:
+        fields |= {"exact_t": exact.t, "exact_p_q": exact.P[:, 0], "exact_p_v": exact.P[:, 1]}
     guess = first_guess(params.problem(params.x0, params.horizon), params.guess)
-    none = np.zeros(0)
     moment = min(now, params.horizon)
     return fields | {
-        "tail_t": tail.t if tail else none,
-        "tail_q": tail.X[:, 0] if tail else none,
-        "exact_t": exact.t if exact else none,
-        "exact_p_q": exact.P[:, 0] if exact else none,
-        "exact_p_v": exact.P[:, 1] if exact else none,
         "guess_q": guess.X[:, 0],
         "guess_v": guess.X[:, 1],
         "now_t": np.full(len(known), moment),

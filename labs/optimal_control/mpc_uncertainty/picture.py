@@ -21,6 +21,8 @@ COLORS: tuple[Color, ...] = ("actual", "reference", "force")
 BODIES: tuple[Vector3, ...] = (BLUE, ORANGE, (0.7, 0.16, 0.5))
 RAILS = (0.9, 0.45, 0.0)
 """[m] their places along x."""
+NAMED = (-1.3, -0.8, -0.3)
+"""[m] where their names stand along y: one behind the other they would lie on each other."""
 LOWER, UPPER = np.array([-1.5, -1.1]), np.array([1.25, 1.1])
 """Of the plane."""
 CLOSE_BELOW, CLOSE_ABOVE = np.array([0.55, 0.6]), np.array([0.25, 0.6])
@@ -45,12 +47,12 @@ def phase_plane(params: UncertaintyParams) -> PhasePlane:
 
 def draw_carts(scene: Scene, params: UncertaintyParams, first: np.ndarray) -> None:
     """The first run of each controller, at its state (3, 2), each with a wall of its own."""
-    for name, x, place, color in zip(NAMES, first, RAILS, BODIES, strict=True):
+    for name, x, place, color, along in zip(NAMES, first, RAILS, BODIES, NAMED, strict=True):
         scene.arm(f"{name} cart", mass_on_a_line(place, color), x[:1])
         near = params.wall + HALF_CART
         corners = [(near, FLOOR), (near + SLAB, FLOOR), (near + SLAB, TOP), (near, TOP)]
         scene.polygon(f"wall of {name}", np.array([(place, y, z) for y, z in corners]), "warning")
-        scene.label(f"name of {name}", name, (place, -1.3, 0.6))
+        scene.label(f"name of {name}", name, (place, along, 0.6))
 
 
 def draw_limits(scene: Scene, plane: PhasePlane, params: UncertaintyParams) -> None:

@@ -9,7 +9,7 @@ from labs.optimal_control.families import global_methods, side_by_side
 from labs.optimal_control.families.comparison import paid_until
 from labs.optimal_control.families.lab import REST, Families, FamiliesState
 from labs.optimal_control.families.params import WINDOWS, FamiliesParams
-from labs.optimal_control.families.picture import floor, state_at
+from labs.optimal_control.families.picture import ABOVE, LAYOUTS, Surface, floor, state_at
 from labs.scene import NullScene
 from tests.labs.optimal_control.families.simulation import (
     COARSE,
@@ -156,3 +156,16 @@ def test_the_hand_finds_the_state_under_it(system: str) -> None:
     wanted = {"angle" if system == "pendulum" else "place": 1.0, "velocity": -0.5}
     assert Families().edit(of, "start", (x, y, z)) == wanted
     assert Families().edit(of, "other", (x, y, z)) == {}
+
+
+def test_the_surface_hides_no_path_from_who_comes_in() -> None:
+    world = solved(COARSE)
+    surface = Surface.of(params(world), results(world))
+    eye = np.array(LAYOUTS["pendulum"].camera[0])
+    ends = [surface.lift(motion.X) for motion in results(world).motions.values()]
+    ways = np.linspace(np.concatenate(ends), eye, 400)[1:-1].reshape(-1, 3)
+    lower, upper = LAYOUTS["pendulum"].window
+    states = np.array([state_at(params(world), (x, y, z)) for x, y, z in ways])
+    over = ((states > lower) & (states < upper)).all(axis=1)
+    assert over.sum() > 1000
+    assert (ways[over, 2] > (surface.lift(states[over]) - ABOVE)[:, 2]).all()

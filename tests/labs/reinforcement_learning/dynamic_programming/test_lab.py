@@ -98,7 +98,7 @@ def test_what_has_no_limit_is_not_begun_and_says_why() -> None:
     assert (world.state.iterates.count == 0).all()
     done = world.latest.done if world.latest else ""
     assert "Value iteration: not begun: with gamma = 1 the cost-to-go of 1 of 4 states" in done
-    assert "From 1 states no way" in world.lab.notes(world.params, world.state)["about"]
+    assert "From 1 state no way" in world.lab.notes(world.params, world.state)["about"]
     assert (solved({"map": sealed, "gamma": 1.0}).state.iterates.count > 0).all()
     swinging = solved({"world": "pendulum", "gamma": 1.0, "nodes": 31})
     assert (swinging.state.iterates.count > 0).tolist() == [False, False, True, True]

@@ -66,6 +66,7 @@ class _Writer:
         self.markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
         self.markdown.use(dollarmath_plugin, allow_digits=False, double_inline=True)
         self.markdown.core.ruler.before("inline", "first_formula", _shield_first_formula)
+        self.markdown.core.ruler.push("touching", _keep_together)
         for rule, method in (
             ("math_inline", self._inline),
             ("math_inline_double", self._display),
@@ -196,6 +197,33 @@ def _shield_first_formula(state: StateCore) -> None:
     for token in state.tokens:
         if token.type == "inline" and token.content.startswith("$"):
             token.content += "\u200b"  # a space without width
+
+
+def _keep_together(state: StateCore) -> None:
+    """What touches a formula, a bracket before it or a comma after it, stays on its line."""
+    for token in state.tokens:
+        children = token.children or []
+        for i in reversed(range(len(children))):
+            if children[i].type != "math_inline":
+                continue
+            before = _take(children, i - 1, r"[^\s\u200b]*\Z")
+            after = _take(children, i + 1, r"\A[^\s\u200b]*")
+            if before or after:
+                opening, closing = _html(f'<span class="joined">{before}'), _html(f"{after}</span>")
+                children[i : i + 1] = [opening, children[i], closing]
+
+
+def _take(children: Sequence[Token], i: int, pattern: str) -> str:
+    """Cuts what a pattern finds out of a text, if the i-th is one; as HTML."""
+    if not 0 <= i < len(children) or children[i].type != "text":
+        return ""
+    found = re.search(pattern, children[i].content)
+    children[i].content = re.sub(pattern, "", children[i].content, count=1)
+    return escape(found[0]) if found else ""
+
+
+def _html(source: str) -> Token:
+    return Token("html_inline", "", 0, content=source)
 
 
 def _inner(formula: str) -> str:

@@ -1,6 +1,7 @@
 """Articles render, and refuse what a page could not show or a lab could not run."""
 
 import dataclasses
+import re
 
 import pytest
 
@@ -133,6 +134,15 @@ def test_a_greek_letter_in_a_formula_that_stands_alone_is_its_knob() -> None:
         assert "data-param" not in html(f"$${other}$$"), other
     assert "data-param" not in html("with $\\gamma = 1$")
     assert "\u2061" in html("$$\\sin \\gamma$$")  # applies the function
+
+
+def test_what_touches_a_formula_stays_on_its_line(entry: Entry) -> None:
+    html = write(entry, "$x$, not ($y$), & the $z$ <alone>, as $n$-th; $a$").html
+    kept = re.findall(r'<span class="joined">(.*?)<math>.*?</math>(.*?)</span>', html)
+    assert kept == [("", ","), ("(", "),"), ("", "-th;")]
+    assert "</span> not <span" in html
+    assert " &amp; the <math><mi>z</mi></math> &lt;alone&gt;, as" in html
+    assert "</span> <math><mi>a</mi></math>" in html
 
 
 def test_an_experiment_is_read_and_shown(entry: Entry) -> None:

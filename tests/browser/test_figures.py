@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -132,3 +133,45 @@ def check_paper(page: Page, lab: LabPage) -> None:
         expect(page.locator(gone)).to_be_hidden()
     page.evaluate("dispatchEvent(new Event('afterprint'))")
     expect(figure).to_have_count(0)
+
+
+AXES = """async ([height, yLabel, range, logY]) => {
+  const { Chart } = await import("/static/js/plots/chart.js");
+  const body = document.body.appendChild(document.createElement("div"));
+  body.style.cssText = `position: fixed; inset: 0 auto auto 0; width: 300px; height: ${height}px`;
+  const chart = new Chart(body);
+  chart.svg.style.cssText = "position: absolute; width: 100%; height: 100%; font: 12px system-ui";
+  chart.begin([0, 30000], range, { yLabel, logY });
+  const frame = body.getBoundingClientRect();
+  const texts = [...body.querySelectorAll("text")];
+  const whole = texts.every((text) => {
+    const box = text.getBoundingClientRect();
+    return box.left >= -1 && box.top >= -1 && box.right <= 301 && box.bottom <= height + 1;
+  });
+  body.remove();
+  const upright = texts.filter((text) => text.hasAttribute("transform"));
+  const beside = texts.filter((text) => text.getAttribute("text-anchor") === "end");
+  const words = (found) => found.map((text) => text.textContent);
+  return { whole, label: words(upright), numbers: words(beside) };
+}"""
+
+
+def test_axes_carry_two_numbers_and_their_whole_label(page: Page) -> None:
+    page.goto("/")
+    for height, label, shown in (
+        (200, "beyond the wall [cm]", ["beyond the wall [cm]"]),
+        (130, "beyond the wall [cm]", ["beyond the wall [cm]"]),  # longer than the axis alone
+        (90, "beyond the wall [cm]", ["beyond the", "wall [cm]"]),
+        (60, "distance beyond the farther wall [cm]", ["…", "[cm]"]),
+    ):
+        axes = page.evaluate(AXES, [height, label, [0, 1], False])
+        assert [re.sub(".*…", "…", line) for line in axes["label"]] == shown
+        assert axes["whole"], "nothing is cut, the last number of the other axis neither"
+    for decades, numbers in (
+        ([-2.46, -1.05], ["0.01", "0.03"]),
+        ([2.3, 3.9], ["300", "1000", "3000"]),
+        ([-3.5, -1.1], ["0.001", "0.01"]),
+        ([0.31, 0.69], ["3", "4"]),
+        ([-8, 0], ["10⁻⁵", "1"]),
+    ):
+        assert page.evaluate(AXES, [90, "", decades, True])["numbers"] == numbers

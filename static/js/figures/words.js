@@ -25,6 +25,18 @@ export function wrapped(text, width) {
   });
 }
 
+// A label in one line or in two, none wider than this [px]: words that have no room end in "…", the
+// unit stays.
+export function fitted(text, width) {
+  const lines = widthOf(text) <= width ? [text] : wrapped(text, width);
+  if (lines.length <= 2 && lines.every((line) => widthOf(line) <= width)) return lines;
+  const [, name, unit] = text.match(/^(.*?)( \[[^\]]*\])?$/);
+  let letters = name.length - 1;
+  while (letters > 1 && widthOf(`${name.slice(0, letters)}…`) > width) letters -= 1;
+  const short = `${name.slice(0, letters).trimEnd()}…`;
+  return unit ? [short, unit.trim()] : [short];
+}
+
 // A formula in MathML as pieces of text on one line: {text, italic, level}, level 1 a superscript
 // and −1 a subscript.
 export function piecesOf(node, level = 0) {

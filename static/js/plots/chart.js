@@ -2,6 +2,7 @@
 // that leaves the page. Its colours come from the style sheet, so that a change of theme needs no
 // redrawing.
 
+import { fitted, widthOf } from "../figures/words.js";
 import { about, decades, label, power, ticks } from "./ticks.js";
 
 let clips = 0;
@@ -44,7 +45,8 @@ export class Chart {
     const yText = logY ? power : label;
     // As wide as the longest number, so that none is cut off: digits are 0.56 em wide or less.
     const digits = Math.max(...yTicks(y0, y1).map((v) => yText(v).length), 3);
-    const left = (0.9 + 0.56 * Math.min(digits, 12)) * em + (yLabel ? 1.6 * em : 0);
+    const upright = yLabel ? fitted(yLabel, (height * 12) / em) : [];
+    const left = (0.9 + 0.56 * Math.min(digits, 12) + (upright.length ? 0.4 + 1.2 * upright.length : 0)) * em;
     this.area = { left, top: 0.7 * em, width: Math.max(1, width - left - (1 + right) * em), height: tall };
     if (square) {
       const perPixel = Math.max((x1 - x0) / this.area.width, (y1 - y0) / this.area.height);
@@ -64,14 +66,26 @@ export class Chart {
       if ((v - 1) % every && numbers) continue;
       if (grid && !xTicks) this.line([v, y0], [v, y1], v === 0 && !logX ? "zero" : "grid");
       const text = xNames?.[v - 1] ?? (logX ? power : label)(v);
-      const [x, y] = [this.x(v), top + this.area.height + (slanted ? 1 : 1.5) * em];
-      const made = this.text(x, y, text.length > 12 ? `${text.slice(0, 11)}…` : text, slanted ? "end" : "middle");
+      const shown = text.length > 12 ? `${text.slice(0, 11)}…` : text;
+      // A long number at the very end is moved until it is whole.
+      const x = slanted ? this.x(v) : Math.min(this.x(v), width - (widthOf(shown) * em) / 24);
+      const y = top + this.area.height + (slanted ? 1 : 1.5) * em;
+      const made = this.text(x, y, shown, slanted ? "end" : "middle");
       if (slanted) made.setAttribute("transform", `rotate(-35 ${x} ${y})`);
     }
     if (xLabel) this.text(left + this.area.width / 2, height - 0.35 * em, xLabel, "middle");
-    if (yLabel) {
-      const [x, y] = [1.1 * em, top + this.area.height / 2];
-      this.text(x, y, yLabel, "middle").setAttribute("transform", `rotate(-90 ${x} ${y})`);
+    this.upright(upright, 1.1 * em);
+  }
+
+  // Lines of text from bottom to top, the first with its foot at x: in the middle of the area, or as
+  // near to it as they are whole.
+  upright(lines, x) {
+    const { top, height } = this.area;
+    for (const [i, text] of lines.entries()) {
+      const half = (widthOf(text) * this.em) / 24;
+      const y = Math.max(half, Math.min(top + height / 2, this.body.clientHeight - half));
+      const foot = x + 1.2 * i * this.em;
+      this.text(foot, y, text, "middle").setAttribute("transform", `rotate(-90 ${foot} ${y})`);
     }
   }
 

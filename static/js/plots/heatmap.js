@@ -1,10 +1,11 @@
 // A field over a plane in colours, with a scale beside it and arrows over it. Its cells are drawn on
 // a canvas beneath the chart; in a figure each is a rectangle.
 
+import { fitted } from "../figures/words.js";
 import { number } from "../format.js";
 import { paintArrows } from "./arrows.js";
 import { card, element } from "./card.js";
-import { Chart } from "./chart.js";
+import { Chart, em } from "./chart.js";
 import { fill } from "./labels.js";
 import { extent, sentences } from "./summary.js";
 import { around, bounds, label, ticks } from "./ticks.js";
@@ -56,7 +57,8 @@ export class HeatMap {
     const [xLabel, yLabel, zLabel] = this.labels;
     const whole = [...x, ...y].every(Number.isInteger);
     const scale = ticks(...range, chart.body.clientHeight / 48);
-    const right = 2.2 + 0.56 * Math.max(...scale.map((v) => label(v).length), 2) + (zLabel ? 1.6 : 0);
+    const zLines = zLabel ? fitted(zLabel, (chart.body.clientHeight * 12) / em()) : [];
+    const right = 2.2 + 0.56 * Math.max(...scale.map((v) => label(v).length), 2) + (zLines.length ? 0.4 + 1.2 * zLines.length : 0);
     chart.begin(bounds(xEdges), bounds(yEdges), { xLabel, yLabel, downward: this.plot.downward, whole, right, grid: false });
     z.forEach((row, i) => {
       const [top, bottom] = [chart.y(yEdges[i]), chart.y(yEdges[i + 1])].sort((a, b) => a - b);
@@ -67,7 +69,7 @@ export class HeatMap {
         if (tones[j]) cell({ x: left, y: top, width: end - left, height: bottom - top, fill: tones[j] });
       }
     });
-    paintScale(chart, range, scale, zLabel);
+    paintScale(chart, range, scale, zLines);
     paintArrows(chart, arrows);
   }
 
@@ -106,7 +108,7 @@ export class HeatMap {
 }
 
 // The scale of colours, right of the area.
-function paintScale(chart, [low, high], scale, text) {
+function paintScale(chart, [low, high], scale, lines) {
   const { left, top, width, height } = chart.area;
   const { em } = chart;
   const bar = { x: left + width + 0.8 * em, width: 0.8 * em };
@@ -118,9 +120,7 @@ function paintScale(chart, [low, high], scale, text) {
     chart.add("rect", { ...bar, y, height: height / count + (k < count - 1 ? 0.5 : 0), fill });
   }
   for (const v of scale) chart.text(bar.x + bar.width + 0.35 * em, place(v) + 0.35 * em, label(v), "start");
-  if (!text) return;
-  const [x, y] = [chart.body.clientWidth - 0.6 * em, top + height / 2];
-  chart.text(x, y, text, "middle").setAttribute("transform", `rotate(-90 ${x} ${y})`);
+  chart.upright(lines, chart.body.clientWidth - (1.2 * lines.length - 0.6) * em);
 }
 
 // Where cells end: midway between their middles, and as far beyond the outermost.

@@ -47,14 +47,22 @@ function multiples(low, high, step) {
 }
 
 // Ticks of a logarithmic axis: whole decades, or 1, 2 and 5 of each, or 1 and 3, where there are few
-// decades and the numbers do not touch.
+// decades and the numbers do not touch. Two at least, however close: a number alone shows no scale.
 export function decades(low, high, most) {
   const stride = Math.max(1, Math.ceil((high - low) / Math.max(1, most)));
   const room = (fewest) => high - low <= 2 && Math.log10(fewest) * most > 0.48 * (high - low);
-  const steps = (room(2) ? [1, 2, 5] : room(3) ? [1, 3] : [1]).map(Math.log10);
+  const found = parts(low, high, room(2) ? [1, 2, 5] : room(3) ? [1, 3] : [1], stride);
+  if (found.length > 1) return found;
+  const closer = [[1], [1, 3], [1, 2, 5]].map((steps) => parts(low, high, steps));
+  const even = ticks(10 ** low, 10 ** high, most).map(Math.log10); // where a decade is too long
+  return [...closer, even].find(({ length }) => length > 1) ?? found;
+}
+
+// The logarithms of these multiples of every power of ten, or of every so many.
+function parts(low, high, steps, stride = 1) {
   const found = [];
   for (let k = Math.floor(low / stride) * stride; k <= high; k += stride) {
-    found.push(...steps.map((part) => k + part).filter((v) => v >= low && v <= high));
+    found.push(...steps.map((step) => k + Math.log10(step)).filter((v) => v >= low && v <= high));
   }
   return found;
 }

@@ -68,7 +68,7 @@ export class SolverRow {
     this.button.setAttribute("aria-label", running ? "Pause the solver" : "Run the solver");
     if (document.activeElement !== this.pace) this.showPace(pace);
     const text = this.sentence(status);
-    if (this.says.textContent !== text) this.says.textContent = this.says.title = text;
+    if (this.says.textContent !== text) this.says.textContent = text;
     this.bar.parentElement.classList.toggle("over", Boolean(status.done));
     this.bar.style.width = `${100 * (status.progress ?? 0)}%`;
     this.showControls();

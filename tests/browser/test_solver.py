@@ -42,8 +42,18 @@ def test_it_runs_is_held_and_goes_step_by_step(page: Page) -> None:
     expect(page.locator("#solve")).to_have_attribute("aria-pressed", "false")
 
 
+NEEDED = """menu => {
+  const shown = menu.offsetWidth;
+  menu.style.cssText = "width: max-content; max-width: none";
+  const needed = menu.offsetWidth;
+  menu.style.cssText = "";
+  return needed - shown;
+}"""
+
+
 def test_a_pace_shows_progress_and_the_time_left(page: Page) -> None:
     LabPage(page, scene=False).open("descent")
+    assert page.locator("#solver-pace").evaluate(NEEDED) <= 0, "every pace is read whole"
     page.select_option("#solver-pace", "10")
     page.locator("h1").click()
     page.keyboard.press("r")

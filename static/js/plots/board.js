@@ -10,6 +10,7 @@ import { isShown } from "./labels.js";
 import { Matrix } from "./matrix.js";
 import { Note } from "./note.js";
 import { forgetColours } from "./palette.js";
+import { NumbersRow } from "./numbers.js";
 import { Readouts } from "./readouts.js";
 import { Shelf } from "./shelf.js";
 import { summarise } from "./summary.js";
@@ -35,6 +36,7 @@ export class Board {
     this.labels = {}; // what the lab says under its present parameters
     this.said = "{}";
     this.readouts = new Readouts(lab.plots.filter((p) => p.kind === "Readout"), document.getElementById("tiles"));
+    new NumbersRow();
     this.plots = lab.plots.filter((p) => p.kind in KINDS).map((p) => new KINDS[p.kind](p, this));
     document.getElementById("plots").append(...this.plots.map((plot) => plot.section));
     this.shelf = new Shelf(lab.slug, this.plots, () => this.rearranged());

@@ -3,6 +3,7 @@
 // as well, and guess and outcome are set side by side.
 
 import { Prediction } from "./predict.js";
+import { PHONE } from "./sheet.js"; // where the card itself grows, and keeps its place
 
 export class Experiments {
   constructor(lab, apply, board, highlight) {
@@ -42,8 +43,10 @@ export class Experiments {
     this.current = this.predictions[i];
     this.current?.begin();
     card.querySelector("details").open = true;
-    card.scrollIntoView({ block: "nearest" });
-    card.querySelector("details").scrollIntoView({ block: "nearest" }); // where the card is taller
+    if (!PHONE.matches) {
+      card.scrollIntoView({ block: "nearest" });
+      card.querySelector("details").scrollIntoView({ block: "nearest" }); // where the card is taller
+    }
     this.highlight(Object.keys(set));
   }
 

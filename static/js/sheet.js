@@ -1,10 +1,10 @@
 // On a phone the scene stays on top and the article scrolls beneath it. Knobs and plots come up as
 // sheets from the lower edge, never as high as the scene; and the current experiment's card holds
-// what it is about: the knobs it set and the plot it watches, before its answer; or, while a curve is
-// sketched, that plot.
+// what it is about: the read-out it names, the plot it watches and the knobs it set, before its
+// answer; or, while a curve is sketched, that plot.
 
 // As in static/css/narrow.css; upright or on its side.
-const PHONE = matchMedia("(max-width: 47.99rem), (max-width: 74.99rem) and (max-height: 35.99rem)");
+export const PHONE = matchMedia("(max-width: 47.99rem), (max-width: 74.99rem) and (max-height: 35.99rem)");
 
 export class Sheets {
   constructor() {
@@ -45,11 +45,19 @@ export class Sheets {
     const [sketching, current] = ["sketching", "current"].map((name) => document.querySelector(`.experiment.${name}`));
     const card = PHONE.matches ? (sketching ?? current) : null;
     const own = (selector, sheet) => (card && this.open !== sheet ? [...document.querySelectorAll(selector)] : []);
-    const wanted = [...(sketching ? [] : own(".knob.set", "knobs")), ...own(".plot:is(.watched, .sketched)", "board")];
+    const wanted = [
+      ...(sketching ? [] : own(".tile.marked", "board")),
+      ...own(".plot:is(.watched, .sketched)", "board"),
+      ...(sketching ? [] : own(".knob.set", "knobs")),
+    ];
     const there = this.lent.map(([element]) => element);
     const moved = wanted.length !== there.length || !wanted.every((element) => there.includes(element));
     const turned = card !== this.card || sketching !== this.sketching;
     if (!moved && !turned) return;
+    // Not out of the hand that has just moved a knob.
+    if (!card && this.box?.contains(document.activeElement)) {
+      return this.box.addEventListener("focusout", () => setTimeout(() => this.arrange()), { once: true });
+    }
     const height = this.box?.offsetHeight;
     for (const [element, place] of this.lent) place.replaceWith(element);
     this.lent = wanted.map((element) => {
@@ -69,6 +77,11 @@ export class Sheets {
     this.box.append(...wanted);
     // Behind a sheet nothing moves.
     this.box.style.minHeight = this.open && !turned ? `${height}px` : "";
-    if (turned) this.box.querySelector(sketching ? ".sketched" : ".plot")?.scrollIntoView();
+    if (!turned) return;
+    if (sketching) return this.box.querySelector(".sketched")?.scrollIntoView();
+    // The question stays in sight, the button before all.
+    for (const part of [...this.box.querySelectorAll(".plot"), card.querySelector(".question"), card.querySelector(".try")]) {
+      part.scrollIntoView({ block: "nearest" });
+    }
   }
 }

@@ -111,8 +111,13 @@ def test_on_a_phone_the_card_holds_its_knobs_and_its_plot(page: Page) -> None:
     expect(own.get_by_role("region", name="Cost", exact=True)).to_be_visible()
     wait_frames(page)
     assert abs(card.evaluate(top) - before) < 844, "nobody is thrown far"
-    for part in ("#view", "#run", "[data-sheet=knobs]"):
+    buttons = ("#run", "#solve", "[data-sheet=knobs]", ".experiment.current .try")
+    for part in ("#view", *buttons, ".experiment.current .question"):
         assert lab.whole(part), part
+    solver, sheets = (page.locator(part).bounding_box() for part in ("#solve", ".sheets"))
+    assert solver
+    assert sheets
+    assert solver["x"] + solver["width"] <= sheets["x"], "pause is not beneath the sheets"
     overflow = "own => own.scrollWidth - own.clientWidth"
     assert own.evaluate(overflow) <= 0
     page.get_by_role("button", name="Plots").click()  # each sheet is whole, too
@@ -132,6 +137,60 @@ def test_on_a_phone_the_card_holds_its_knobs_and_its_plot(page: Page) -> None:
     page.set_viewport_size({"width": 1366, "height": 650})  # all goes back where it belongs
     expect(page.locator("#knobs .knob.set")).to_have_count(2)
     expect(page.locator("#plots > .watched")).to_be_visible()
+
+
+CUT = "says => says.scrollWidth > says.clientWidth + 1"
+
+
+def test_what_the_slim_row_has_no_room_for_is_a_button_away(page: Page) -> None:
+    page.set_viewport_size({"width": 1366, "height": 650})
+    lab = LabPage(page, scene=False).open("lyapunov")
+    tiles, says, more = (
+        ".tile:not([hidden])",
+        page.locator("#solver-says"),
+        page.locator("#more-numbers"),
+    )
+    expect(says).to_have_text(re.compile("of the window"))
+    expect(more).to_have_text(re.compile(r"^\+\d+$"))
+    assert not lab.whole(tiles)
+    assert says.evaluate(CUT)
+    plots = page.locator("#plots").bounding_box()
+    more.press("Enter")
+    expect(more).to_have_attribute("aria-expanded", "true")
+    wait_frames(page)
+    assert lab.whole(tiles)
+    assert lab.whole("#solver-says")
+    assert not says.evaluate(CUT)
+    assert page.locator("#plots").bounding_box() == plots, "nothing else moves"
+    screenshot(page, "numbers-unfolded")
+    page.keyboard.press("Escape")
+    expect(more).to_have_attribute("aria-expanded", "false")
+    page.set_viewport_size({"width": 3840, "height": 1200})
+    expect(more).to_be_hidden()
+    assert lab.whole(tiles)
+
+
+def test_a_moved_knob_stays_in_hand(page: Page) -> None:
+    """An experiment gathers its knobs, and is over when one is moved: that goes home later."""
+    page.set_viewport_size({"width": 1366, "height": 650})
+    lab = LabPage(page, scene=False).open("dqn")
+    for place, width in (("#knobs .gathered", 1366), (".experiment .own", 390)):
+        page.set_viewport_size({"width": width, "height": 844 if width < 400 else 650})
+        page.locator(".experiment .try").nth(7).click()
+        expect(page.locator(f"{place} .knob.set:not([hidden])")).to_have_count(8)
+        if width < 400:
+            expect(page.locator(f"{place} .tile.marked")).to_be_visible()
+        track = page.locator(f"{place} #track-gamma")
+        track.press("ArrowLeft")
+        lab.told(when=lambda status: status["params"]["gamma"] < 0.95)
+        expect(page.locator(".experiment.current")).to_have_count(0)
+        wait_frames(page)
+        expect(track).to_be_focused()
+        track.blur()
+        expect(page.locator(f"{place} .knob")).to_have_count(0)
+        expect(
+            page.locator("#knobs details #param-gamma, #knobs .first #param-gamma")
+        ).to_have_count(1)
 
 
 def lightness(page: Page) -> int:

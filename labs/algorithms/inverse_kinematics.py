@@ -59,7 +59,7 @@ def damped_least_squares(jacobian: np.ndarray, v: np.ndarray, damping: float) ->
 
 
 def joint_rates(method: str, jacobian: np.ndarray, v: np.ndarray, damping: float) -> np.ndarray:
-    """q' (n,) by one of METHODS; only damped least squares looks at `damping`."""
+    """q' (n,) by one of INVERSE_KINEMATICS_METHODS; `damping` is of damped least squares alone."""
     match method:
         case "pseudo-inverse":
             return pseudo_inverse(jacobian, v)

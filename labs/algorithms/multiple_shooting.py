@@ -60,7 +60,7 @@ class Sensitivities(NamedTuple):
 @final
 class MultipleShooting:
     """A problem as a nonlinear programme (`labs.problems.nonlinear_program`) of n variables, with
-    this many `segments`, from 1 to N. `method` is a name of METHODS. Raises LabError."""
+    this many `segments`, from 1 to N. `method` is a name of SHOOTING_METHODS. Raises LabError."""
 
     def __init__(
         self,

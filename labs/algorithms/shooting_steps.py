@@ -40,7 +40,7 @@ class Method(NamedTuple):
     b: tuple[float, ...]
 
 
-METHODS: Mapping[str, Method] = {
+SHOOTING_METHODS: Mapping[str, Method] = {
     "explicit-euler": Method("Explicit Euler", 1, (), (1.0,)),
     "midpoint": Method("Midpoint", 2, (0.5,), (0.0, 1.0)),
     "rk4": Method("Runge-Kutta 4", 4, (0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
@@ -49,12 +49,12 @@ METHODS: Mapping[str, Method] = {
 
 
 def method_of(name: str, N: int, M: int) -> Method:
-    """The one of METHODS for N pieces of M steps. Raises LabError where there is none."""
-    if name not in METHODS:
-        raise LabError(f"no method is named {name!r}; there are {', '.join(METHODS)}")
+    """The one of SHOOTING_METHODS for N pieces of M steps. Raises LabError where there is none."""
+    if name not in SHOOTING_METHODS:
+        raise LabError(f"no method is named {name!r}; there are {', '.join(SHOOTING_METHODS)}")
     if N < 1 or M < 1:
         raise LabError(f"N = {N}, M = {M}: there is at least one piece, and one step in each")
-    return METHODS[name]
+    return SHOOTING_METHODS[name]
 
 
 def advance(

@@ -53,7 +53,8 @@ class Rollout(NamedTuple):
 @final
 class SingleShooting:
     """A problem as a nonlinear programme (`labs.problems.nonlinear_program`) of n variables.
-    `method` is a name of METHODS; `form` is how the running cost is integrated. Raises LabError."""
+    `method` is a name of SHOOTING_METHODS; `form` is how the running cost is integrated. Raises
+    LabError."""
 
     def __init__(
         self,

@@ -9,7 +9,7 @@ import numpy as np
 
 from labs.algorithms import riccati, sqp
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot
-from labs.optimal_control.direct_methods.methods import METHODS, SHORT
+from labs.optimal_control.direct_methods.methods import SHORT, TRANSCRIPTIONS
 from labs.optimal_control.direct_methods.params import DirectMethodsParams
 from labs.optimal_control.direct_methods.picture import draw_plans
 from labs.optimal_control.direct_methods.plots import (
@@ -150,7 +150,7 @@ class DirectMethodsLab(Lab[DirectMethodsParams, DirectMethodsState]):
     def notes(self, params: DirectMethodsParams, state: DirectMethodsState) -> Mapping[str, str]:
         """How each method fares, a line each."""
         lines = [
-            f"{METHODS[name]}: {at.stopped or f'{at.history.iterations} iterations so far.'}"
+            f"{TRANSCRIPTIONS[name]}: {at.stopped or f'{at.history.iterations} iterations so far.'}"
             for name, at in state.race.items()
         ]
         return {"verdicts": "\n".join(lines)}

@@ -20,7 +20,7 @@ from labs.tasks.direct.motions import (
 )
 from labs.tasks.direct.trajectory import Trajectory
 
-METHODS: Mapping[str, str] = {
+TRANSCRIPTIONS: Mapping[str, str] = {
     "single": "Single shooting",
     "multiple": "Multiple shooting",
     "collocation": "Collocation",
@@ -31,7 +31,7 @@ SHORT = ("single", "multiple", "collocation")
 
 @dataclass(frozen=True)
 class Transcription:
-    """A problem as one of METHODS makes it finite."""
+    """A problem as one of TRANSCRIPTIONS makes it finite."""
 
     program: NonlinearProgram
     variables: Callable[[Guess], np.ndarray]

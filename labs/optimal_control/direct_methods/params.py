@@ -1,6 +1,6 @@
 """The tunables of the race, beside those of the motion."""
 
-from labs.optimal_control.direct_methods.methods import METHODS
+from labs.optimal_control.direct_methods.methods import TRANSCRIPTIONS
 from labs.params import Group
 from labs.tasks.direct.params import WORLD, DirectParams
 from labs.tasks.direct.plan_params import LIGHT
@@ -19,7 +19,7 @@ class DirectMethodsParams(DirectParams):
 
     view: str = SCENE.choice("plans", VIEWS, "Show", key=True)
     """The three motions as they are planned, side by side; or one of them on the simulator."""
-    played: str = WORLD.choice("collocation", METHODS, "Play", key=True)
+    played: str = WORLD.choice("collocation", TRANSCRIPTIONS, "Play", key=True)
     """Whose plan the simulator plays: alone (open loop), and with a regulator about it."""
 
     pieces: float = TRANSCRIPTION.knob(

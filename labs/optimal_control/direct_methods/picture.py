@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from labs.models.arms import Arm
-from labs.optimal_control.direct_methods.methods import METHODS
+from labs.optimal_control.direct_methods.methods import TRANSCRIPTIONS
 from labs.optimal_control.direct_methods.params import DirectMethodsParams
 from labs.optimal_control.direct_methods.race import Entrant, Race
 from labs.scene import Color, Scene
@@ -85,8 +85,8 @@ def _draw_plan(
         scene.trail(f"path of {name}, piece {i}", run, "warning" if at.failed else COLORS[name])
     place = np.array(layout.label) + offset
     if not layout.depth:
-        place = task.mechanism.tip(q) + place * (1 + list(METHODS).index(name))
-    scene.label(f"name of {name}", METHODS[name] + (": failed" if at.failed else ""), place)
+        place = task.mechanism.tip(q) + place * (1 + list(TRANSCRIPTIONS).index(name))
+    scene.label(f"name of {name}", TRANSCRIPTIONS[name] + (": failed" if at.failed else ""), place)
 
 
 @cache
@@ -94,7 +94,7 @@ def _dressed(system_name: str, method: str) -> Arm:
     """The robot of a system, in the colour and at the place of a method."""
     task = system(system_name)
     arm, depth = task.mechanism.arm, LAYOUTS[task.motion].depth
-    moved = translation(-depth * list(METHODS).index(method), 0.0, 0.0)
+    moved = translation(-depth * list(TRANSCRIPTIONS).index(method), 0.0, 0.0)
     model = pin.Model(arm.model)
     for joint in range(1, model.njoints):
         if model.parents[joint] == 0:

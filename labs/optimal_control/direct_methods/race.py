@@ -7,7 +7,7 @@ import numpy as np
 
 from labs.algorithms import sqp
 from labs.algorithms.sqp import Iterate
-from labs.optimal_control.direct_methods.methods import METHODS, Transcription, transcribe
+from labs.optimal_control.direct_methods.methods import TRANSCRIPTIONS, Transcription, transcribe
 from labs.optimal_control.direct_methods.params import DirectMethodsParams
 from labs.optimal_control.direct_methods.structure import Structure, structure_of
 from labs.resumable import Resumable, run_to_completion
@@ -35,7 +35,7 @@ class Entrant:
 
 
 Race = Mapping[str, Entrant]
-"""By the keys of METHODS."""
+"""By the keys of TRANSCRIPTIONS."""
 
 
 def lined_up(params: DirectMethodsParams) -> Race:
@@ -81,9 +81,11 @@ def run_race(
 def verdict(race: Race) -> str:
     """How all of them ended, in a line."""
     if all(entrant.converged for entrant in race.values()):
-        counts = [f"{METHODS[name].lower()} {at.history.iterations}" for name, at in race.items()]
+        counts = [
+            f"{TRANSCRIPTIONS[name].lower()} {at.history.iterations}" for name, at in race.items()
+        ]
         return f"All three converged. Iterations: {', '.join(counts)}."
-    return " ".join(f"{METHODS[name]}: {_short(entrant)}" for name, entrant in race.items())
+    return " ".join(f"{TRANSCRIPTIONS[name]}: {_short(entrant)}" for name, entrant in race.items())
 
 
 def _short(entrant: Entrant) -> str:

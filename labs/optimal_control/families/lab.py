@@ -18,7 +18,7 @@ from labs.optimal_control.families.plots import (
     table_fields,
 )
 from labs.optimal_control.families.side_by_side import (
-    METHODS,
+    FAMILY_NAMES,
     UNKNOWN,
     Results,
     no_results,
@@ -68,7 +68,7 @@ class Families(Lab[FamiliesParams, FamiliesState]):
 
     def solve(self, params: FamiliesParams, state: FamiliesState) -> Iterator[Snapshot | None]:
         """A round of all four a snapshot."""
-        seconds = dict.fromkeys(METHODS, 0.0)
+        seconds = dict.fromkeys(FAMILY_NAMES, 0.0)
         rounds = 0
         for at in solve_side_by_side(params, state.results.motions, seconds):
             if at is None:
@@ -131,7 +131,7 @@ class Families(Lab[FamiliesParams, FamiliesState]):
     def labels(self, params: FamiliesParams) -> Mapping[str, str | tuple[str, ...]]:
         slides = params.system == "mass"
         return {
-            "methods": tuple(METHODS.values()),
+            "methods": tuple(FAMILY_NAMES.values()),
             "unit": "m" if slides else "rad",
             "control_unit": "N" if slides else "N·m",
         }
@@ -147,7 +147,7 @@ class Families(Lab[FamiliesParams, FamiliesState]):
         sqp.prepare()
         params = FamiliesParams(nodes=21.0, hjb_steps=5.0, dp_steps=5.0, horizon=0.5)
         for _ in solve_side_by_side(
-            params, no_results(params).motions, dict.fromkeys(METHODS, 0.0)
+            params, no_results(params).motions, dict.fromkeys(FAMILY_NAMES, 0.0)
         ):
             pass
 
@@ -159,5 +159,5 @@ def outcome(at: Results) -> str:
     span = f"{min(costs):.4g} to {max(costs):.4g}" if costs else "none"
     if not failed:
         return f"All four have ended, with costs of {span}."
-    why = " ".join(f"{METHODS[name]}: {at.motions[name].message}" for name in failed)
+    why = " ".join(f"{FAMILY_NAMES[name]}: {at.motions[name].message}" for name in failed)
     return f"{len(costs)} of four have found a motion, with costs of {span}. {why}"

@@ -16,7 +16,7 @@ from labs.models.mass_on_a_line import mass_on_a_line
 from labs.models.pendulums import hanging
 from labs.optimal_control.families.motion import Motion
 from labs.optimal_control.families.params import FamiliesParams
-from labs.optimal_control.families.side_by_side import METHODS, Results
+from labs.optimal_control.families.side_by_side import FAMILY_NAMES, Results
 from labs.scene import Color, Scene
 from labs.shapes import Vector3
 
@@ -140,7 +140,7 @@ def draw_bodies(scene: Scene, params: FamiliesParams, at: Results, now: float) -
         else:
             body, label = mass_on_a_line(x, BODIES[name]), (x, -1.7, 0.62)
         scene.arm(name, body, q, ghost=not motion.known)
-        scene.label(f"name of {name}", METHODS[name], label)
+        scene.label(f"name of {name}", FAMILY_NAMES[name], label)
 
 
 def draw_values(scene: Scene, params: FamiliesParams, at: Results, now: float) -> None:

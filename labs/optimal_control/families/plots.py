@@ -7,7 +7,7 @@ import numpy as np
 from labs.optimal_control.families.closed_form import closed_form
 from labs.optimal_control.families.motion import first_guess
 from labs.optimal_control.families.params import FamiliesParams
-from labs.optimal_control.families.side_by_side import GLOBAL, METHODS, Results, reference
+from labs.optimal_control.families.side_by_side import FAMILY_NAMES, GLOBAL, Results, reference
 from labs.plots import Bars, Curves, HeatMap, Note, Plot, Readout, Trace
 
 SERIES = {"hjb": 1, "dp": 2, "pontryagin": 4, "direct": 7}
@@ -21,7 +21,7 @@ DEAR = 4.0
 def _curves(title: str, x: str, y: str, x_label: str, y_label: str, *more: Trace) -> Curves:
     """A curve of each method."""
     traces = [
-        Trace(f"{x}_{name}", f"{y}_{name}", METHODS[name], "line", series)
+        Trace(f"{x}_{name}", f"{y}_{name}", FAMILY_NAMES[name], "line", series)
         for name, series in SERIES.items()
     ]
     return Curves(title, x_label, y_label, *traces, *more)
@@ -61,8 +61,8 @@ PLOTS: tuple[Plot, ...] = (
         "Error of V over the nodes",
         "nodes along an axis",
         "|V(x₀) − J|",
-        Trace("nodes_hjb", "error_hjb", METHODS["hjb"], "marked", 1),
-        Trace("nodes_dp", "error_dp", METHODS["dp"], "marked", 2),
+        Trace("nodes_hjb", "error_hjb", FAMILY_NAMES["hjb"], "marked", 1),
+        Trace("nodes_dp", "error_dp", FAMILY_NAMES["dp"], "marked", 2),
         log_x=True,
         log_y=True,
         when={"study": ("grid",)},
@@ -71,8 +71,8 @@ PLOTS: tuple[Plot, ...] = (
         "Cost by the first guess",
         "A [{unit}]",
         "J",
-        Trace("swing_pontryagin", "found_pontryagin", METHODS["pontryagin"], "points", 4),
-        Trace("swing_direct", "found_direct", METHODS["direct"], "marked", 7),
+        Trace("swing_pontryagin", "found_pontryagin", FAMILY_NAMES["pontryagin"], "points", 4),
+        Trace("swing_direct", "found_direct", FAMILY_NAMES["direct"], "marked", 7),
         log_y=True,
         when={"study": ("guess",)},
     ),
@@ -137,7 +137,7 @@ def study_fields(
     fields = {
         "costs": np.array(costs),
         "promises": np.array(promises),
-        "durations": np.array([1e3 * float(seconds.get(name, 0.0)) for name in METHODS]),
+        "durations": np.array([1e3 * float(seconds.get(name, 0.0)) for name in FAMILY_NAMES]),
     }
     x, y = {"hjb": "nodes", "dp": "nodes"}, {"hjb": "error", "dp": "error"}
     for column, (first, second) in enumerate((("hjb", "pontryagin"), ("dp", "direct"))):
@@ -155,5 +155,5 @@ def account(at: Results) -> str:
     lines = []
     for name, motion in at.motions.items():
         cost = f"cost {motion.cost:.5g}. " if motion.known else ""
-        lines.append(f"{METHODS[name]}: {cost}{motion.message}")
+        lines.append(f"{FAMILY_NAMES[name]}: {cost}{motion.message}")
     return "\n".join(lines)

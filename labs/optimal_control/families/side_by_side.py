@@ -26,7 +26,7 @@ from labs.optimal_control.families.params import FamiliesParams
 from labs.optimal_control.families.study import Study, no_study, run_study
 from labs.resumable import Resumable, timed
 
-METHODS = {"hjb": "HJB", "dp": "DP", "pontryagin": "Pontryagin", "direct": "Direct"}
+FAMILY_NAMES = {"hjb": "HJB", "dp": "DP", "pontryagin": "Pontryagin", "direct": "Direct"}
 """Their names: Hamilton-Jacobi-Bellman, dynamic programming, Pontryagin's minimum principle, and
 collocation as the direct method."""
 GLOBAL = ("hjb", "dp")
@@ -63,8 +63,8 @@ def no_results(params: FamiliesParams) -> Results:
     still, grid = no_motion(problem), params.grid(round(params.nodes))
     values = final_values(params.cost, grid)
     return Results(
-        motions=dict.fromkeys(METHODS, still),
-        progress=dict.fromkeys(METHODS, 0.0),
+        motions=dict.fromkeys(FAMILY_NAMES, still),
+        progress=dict.fromkeys(FAMILY_NAMES, 0.0),
         values=dict.fromkeys(GLOBAL, values),
         gradients={name: np.zeros_like(still.P) for name in GLOBAL},
         tail=still,

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labs.algorithms.multiple_shooting import MultipleShooting
-from labs.algorithms.shooting_steps import METHODS
+from labs.algorithms.shooting_steps import SHOOTING_METHODS
 from labs.params import Group
 from labs.tasks.direct.guesses import Guess
 from labs.tasks.direct.params import DirectParams
@@ -26,7 +26,7 @@ class MultipleShootingParams(DirectParams):
     )
     """Steps of integration in each piece. They add no variables. Of the UR5 it is one."""
     integrator: str = SHOOTING.choice(
-        "rk4", {name: method.title for name, method in METHODS.items()}, "Integrator"
+        "rk4", {name: method.title for name, method in SHOOTING_METHODS.items()}, "Integrator"
     )
     """By which the states of a segment follow from its start and its controls."""
     study: str = SHOOTING.choice(

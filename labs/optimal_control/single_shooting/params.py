@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labs.algorithms.shooting_steps import FORMS, METHODS, CostForm
+from labs.algorithms.shooting_steps import FORMS, SHOOTING_METHODS, CostForm
 from labs.algorithms.single_shooting import SingleShooting
 from labs.algorithms.sqp_iterate import HESSIANS
 from labs.lab import ChoiceSettings
@@ -36,7 +36,10 @@ class SingleShootingParams(PlanParams):
     )
     """Steps of integration in each piece: the accuracy of x. Of the UR5 it is one."""
     integrator: str = SHOOTING.choice(
-        "rk4", {name: method.title for name, method in METHODS.items()}, "Integrator", key=True
+        "rk4",
+        {name: method.title for name, method in SHOOTING_METHODS.items()},
+        "Integrator",
+        key=True,
     )
     """By which x follows from the controls."""
     form: str = SHOOTING.choice(

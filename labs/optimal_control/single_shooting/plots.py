@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labs.algorithms.shooting_steps import METHODS
+from labs.algorithms.shooting_steps import SHOOTING_METHODS
 from labs.optimal_control.single_shooting.changes import FAN, changed_ends, changed_motions
 from labs.optimal_control.single_shooting.history import History
 from labs.optimal_control.single_shooting.params import SingleShootingParams
@@ -99,7 +99,9 @@ PLOTS: tuple[Plot, ...] = (
         "Error of the state",
         "steps a piece M",
         "|x(T) − exact|",
-        Trace("steps", "state_errors", tuple(m.title for m in METHODS.values()), "marked", 1),
+        Trace(
+            "steps", "state_errors", tuple(m.title for m in SHOOTING_METHODS.values()), "marked", 1
+        ),
         log_x=True,
         log_y=True,
         when=INTEGRATION,

@@ -5,7 +5,7 @@ from time import perf_counter
 
 import numpy as np
 
-from labs.algorithms.shooting_steps import FORMS, METHODS, CostForm
+from labs.algorithms.shooting_steps import FORMS, SHOOTING_METHODS, CostForm
 from labs.algorithms.single_shooting import SingleShooting
 from labs.optimal_control.single_shooting.params import SingleShootingParams
 from labs.optimal_control.single_shooting.plan import Plan
@@ -36,12 +36,12 @@ class Study:
     sensitivities_error: float
     """Of the gradient by sensitivities from the adjoint one."""
     state_errors: np.ndarray
-    """(len(INTEGRATION_STEPS), len(METHODS)): |x(T) - exact|, each method's."""
+    """(len(INTEGRATION_STEPS), len(SHOOTING_METHODS)): |x(T) - exact|, each method's."""
     cost_errors: np.ndarray
     """(len(INTEGRATION_STEPS), 2): of J by the augmented state, and by the notes' sum."""
 
 
-NO_STUDY = Study(np.zeros((0, 2)), 0.0, np.zeros((0, len(METHODS))), np.zeros((0, 2)))
+NO_STUDY = Study(np.zeros((0, 2)), 0.0, np.zeros((0, len(SHOOTING_METHODS))), np.zeros((0, 2)))
 
 
 def study_gradients(
@@ -82,7 +82,7 @@ def study_integration(params: SingleShootingParams, plan: Plan) -> Resumable[Stu
     for M in INTEGRATION_STEPS:
         yield
         state_errors.append(
-            [np.linalg.norm(run(M, method, "sum")[0] - exact) for method in METHODS]
+            [np.linalg.norm(run(M, method, "sum")[0] - exact) for method in SHOOTING_METHODS]
         )
         yield
         costs = [run(M, params.integrator, form)[1] for form in FORMS]

@@ -49,7 +49,7 @@ from labs.reinforcement_learning.function_approximation.subject import Training
 from labs.resumable import Resumable, pieces
 from labs.tasks.random_walk.walks import THOUSAND, walk_task
 
-METHODS = {
+TARGET_METHODS = {
     "oracle": ORACLE,
     "mc": GRADIENT_MC,
     "td": SEMI_GRADIENT_TD,
@@ -116,7 +116,7 @@ def _by_episodes(
     part: int,
 ) -> Resumable[dict[str, np.ndarray]]:
     """After so many further episodes, one learner after the other."""
-    features, method = given.features, METHODS[params.target]
+    features, method = given.features, TARGET_METHODS[params.target]
     work = STEPS * (3 * (features.active.shape[1] + 10))
     if method == SEMI_GRADIENT_LAMBDA:
         work += STEPS * 2 * features.size  # the traces of all weights

@@ -11,7 +11,7 @@ from labs.params import Value
 from labs.random_numbers import seeded
 from labs.reinforcement_learning.prediction import batch, corners, online
 from labs.reinforcement_learning.prediction.live import Live, advance, begin
-from labs.reinforcement_learning.prediction.params import METHODS, PredictionParams
+from labs.reinforcement_learning.prediction.params import PREDICTION_METHODS, PredictionParams
 from labs.reinforcement_learning.prediction.picture import (
     clicked_state,
     draw_batch,
@@ -122,10 +122,10 @@ class Prediction(Lab[PredictionParams, PredictionState]):
         if params.study == "corners":
             return _last({"error": training["error"], "looked": training["looked"]}, range(4))
         if params.study == "batch":
-            measured = _last({"misfit": training["misfit"][:, None]}, METHODS)
-            measured |= _last({"residual": training["residual"][:, None]}, METHODS)
+            measured = _last({"misfit": training["misfit"][:, None]}, PREDICTION_METHODS)
+            measured |= _last({"residual": training["residual"][:, None]}, PREDICTION_METHODS)
             if params.data == "predictor":
-                measured |= _last({"V_A": training["V"][:, 0, batch.A, None]}, METHODS)
+                measured |= _last({"V_A": training["V"][:, 0, batch.A, None]}, PREDICTION_METHODS)
             return measured
         x = params.looked_at
         return {
@@ -134,7 +134,7 @@ class Prediction(Lab[PredictionParams, PredictionState]):
             "walker_mc": float(state.live.V[0, x]),
             "walker_td": float(state.live.V[1, x]),
             "walker_true": float(params.prediction.truth[x]),
-        } | _last({name: training[name] for name in online.CURVES}, METHODS)
+        } | _last({name: training[name] for name in online.CURVES}, PREDICTION_METHODS)
 
     def fields(self, params: PredictionParams, state: PredictionState) -> Mapping[str, np.ndarray]:
         training, world = state.training, params.prediction

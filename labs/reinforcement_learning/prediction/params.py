@@ -11,7 +11,7 @@ from labs.reinforcement_learning.prediction.worlds import (
 )
 from labs.tasks.random_walk.walks import FIVE, NINETEEN, WalkShape
 
-METHODS = {"mc": "Monte Carlo", "td": "TD(0)"}
+PREDICTION_METHODS = {"mc": "Monte Carlo", "td": "TD(0)"}
 WALKS = {"five": FIVE, "nineteen": NINETEEN}
 PREDICTOR = WalkShape(2, 0.0, -1.0)
 """What the two states of eight given episodes are drawn on."""
@@ -117,7 +117,7 @@ class PredictionParams(Params):
     )
     """In the scene: of the one who walks there, or of those who have learned already."""
     method: str = VIEW.choice(
-        "td", METHODS, "Method", when={"study": "online", "world": ["grid", "pendulum"]}
+        "td", PREDICTION_METHODS, "Method", when={"study": "online", "world": ["grid", "pendulum"]}
     )
     """Whose values the scene shows; on a walk it shows both."""
     state: float = VIEW.knob(0, 0, 19, "x", "", "State looked at", step=1, when=ONLINE)

@@ -5,7 +5,7 @@ import numpy as np
 
 from labs.reinforcement_learning.prediction.corners import CORNERS
 from labs.reinforcement_learning.prediction.live import Live
-from labs.reinforcement_learning.prediction.params import METHODS
+from labs.reinforcement_learning.prediction.params import PREDICTION_METHODS
 from labs.reinforcement_learning.prediction.worlds import PredictionWorld
 from labs.scene import Scene
 from labs.tasks.grid_world.map import GridWorld
@@ -58,7 +58,7 @@ def draw_world(
     """Values V (2, X) of Monte Carlo and TD(0), on a grid and the pendulum's table those of one
     `method` ("mc" or "td"); on a walk their standard deviation (2, X), if given; and the walker.
     The cell of the state looked at is marked."""
-    shown = list(METHODS).index(method)
+    shown = list(PREDICTION_METHODS).index(method)
     part, (x, y) = min(live.phase, 1.0), live.states[-2:]
     match world.place:
         case WalkShape():
@@ -73,7 +73,7 @@ def draw_world(
             high = float(world.truth.max())
             draw_board(scene, world.place, V[shown], max(high, 1.0), None, relief=True)
             corner = board(world.place).centers[0, 1] + np.array([0.0, 0.25, 0.0])
-            scene.label("method", METHODS[method], corner)
+            scene.label("method", PREDICTION_METHODS[method], corner)
             square = 0.46 * board(world.place).size * SQUARE
             scene.trail(
                 "looked at",
@@ -87,7 +87,7 @@ def draw_world(
             )
         case PendulumGrid():
             high = max(float(world.truth.max()), 1e-3)
-            names = (METHODS[method],)
+            names = (PREDICTION_METHODS[method],)
             draw_table(scene, world.place, V[shown], high, None, _swing(world, live, part), names)
 
 

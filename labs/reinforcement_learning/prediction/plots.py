@@ -7,7 +7,7 @@ import numpy as np
 
 from labs.plots import Curves, HeatMap, Line, Plot, Readout, TimeSeries, Trace
 from labs.reinforcement_learning.prediction.corners import CORNERS
-from labs.reinforcement_learning.prediction.params import METHODS
+from labs.reinforcement_learning.prediction.params import PREDICTION_METHODS
 from labs.reinforcement_learning.prediction.targets import sample_targets
 from labs.reinforcement_learning.prediction.worlds import PredictionWorld
 from labs.tasks.grid_world.map import GridWorld
@@ -28,14 +28,14 @@ def _both(
     """A curve of each method."""
     return tuple(
         Trace(x, f"{y}_{short}", f"{name}{what}", style, i)
-        for i, (short, name) in enumerate(METHODS.items(), 1)
+        for i, (short, name) in enumerate(PREDICTION_METHODS.items(), 1)
     )
 
 
 def _readouts(channel: str, label: str, when: Mapping[str, tuple[str, ...]]) -> tuple[Plot, ...]:
     return tuple(
         Readout(f"{channel}_{short}", f"{label}, {name}", "", when=when)
-        for short, name in METHODS.items()
+        for short, name in PREDICTION_METHODS.items()
     )
 
 
@@ -49,7 +49,7 @@ PLOTS: tuple[Plot, ...] = (
         *_both("along", "estimate"),
         *(
             Trace("beside", f"{edge}_{short}", "", "dash", i, optional=True)
-            for i, short in enumerate(METHODS, 1)
+            for i, short in enumerate(PREDICTION_METHODS, 1)
             for edge in ("low", "high")
         ),
         when=ONLINE,
@@ -143,7 +143,9 @@ def error_curves(training: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Error, bias and spread over episodes."""
     found = {"episodes": training["episodes"]}
     for name in ("error", "bias", "spread"):
-        found |= {f"{name}_{short}": training[name][m] for m, short in enumerate(METHODS)}
+        found |= {
+            f"{name}_{short}": training[name][m] for m, short in enumerate(PREDICTION_METHODS)
+        }
     return found
 
 
@@ -154,7 +156,7 @@ def estimate_curves(
     lines beside."""
     some = world.states
     found = {"along": world.across, "true_V": world.truth[some]}
-    for m, short in enumerate(METHODS):
+    for m, short in enumerate(PREDICTION_METHODS):
         found[f"estimate_{short}"] = V[m, some]
         if spread is not None:
             found["beside"] = world.across
@@ -169,7 +171,7 @@ def target_curves(
     """Targets at state x, sorted; those of TD(0) under the estimates V (X,)."""
     found = {"truth_x": np.array([0.0, 100.0]), "truth_y": np.full(2, world.truth[x])}
     targets = sample_targets(world.task, x, V, random)
-    for short, of in zip(METHODS, targets, strict=True):
+    for short, of in zip(PREDICTION_METHODS, targets, strict=True):
         there = np.sort(of[np.isfinite(of)])
         found[f"target_{short}"] = there
         found[f"share_{short}"] = np.linspace(0.0, 100.0, len(there))
@@ -180,7 +182,7 @@ def target_curves(
 def error_maps(world: PredictionWorld, V: np.ndarray) -> dict[str, np.ndarray]:
     """|V - V^pi| of V (2, X), seen from above; of a walk, nothing."""
     off = np.abs(V - world.truth)
-    names = [f"map_{short}" for short in METHODS]
+    names = [f"map_{short}" for short in PREDICTION_METHODS]
     place = world.place
     if isinstance(place, GridWorld):
         rows, columns = place.shape
@@ -210,7 +212,7 @@ def batch_curves(
     }
     if truth is not None:
         found |= {"batch_cells": cells, "batch_truth": truth[inner]}
-    for m, short in enumerate(METHODS):
+    for m, short in enumerate(PREDICTION_METHODS):
         found[f"batch_{short}"] = V[m]
         found[f"answer_{short}"] = training["error"][m]
         found[f"left_{short}"] = training["left"][m]

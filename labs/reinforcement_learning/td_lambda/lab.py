@@ -18,7 +18,7 @@ from labs.reinforcement_learning.td_lambda.live import (
     n_step_returns,
     return_weights,
 )
-from labs.reinforcement_learning.td_lambda.params import METHODS, TdLambdaParams
+from labs.reinforcement_learning.td_lambda.params import TD_METHODS, TdLambdaParams
 from labs.reinforcement_learning.td_lambda.picture import draw_place
 from labs.reinforcement_learning.td_lambda.plots import (
     ORDER,
@@ -165,7 +165,7 @@ class TdLambda(Lab[TdLambdaParams, TdLambdaState]):
         return {"about": "\n".join(params.place.about)}
 
     def labels(self, params: TdLambdaParams) -> Mapping[str, str | tuple[str, ...]]:
-        names = [METHODS[name] for name in params.methods]
+        names = [TD_METHODS[name] for name in params.methods]
         if len(set(names)) < len(names):
             names = [f"{name}, {order}" for name, order in zip(names, ORDER, strict=True)]
         return {
@@ -186,7 +186,7 @@ class TdLambda(Lab[TdLambdaParams, TdLambdaState]):
     def prepare(cls) -> None:
         """Compiles the loops of all methods; the worlds share them."""
         lab = cls()
-        for method in METHODS:
+        for method in TD_METHODS:
             params = TdLambdaParams(method=method, episodes=1.0, rate=100.0)
             state = lab.init(params, np.random.default_rng(0))
             next(snapshot for snapshot in lab.solve(params, state) if snapshot)
@@ -221,7 +221,7 @@ def _trace(params: TdLambdaParams, state: TdLambdaState) -> np.ndarray:
 
 def _divergence_message(method: str, episode: int) -> str:
     return (
-        f"In episode {episode} the values diverged ({METHODS[method]}): states that come again and "
-        "again pile up a trace, and a surprise moves them too far. Take a smaller step size or "
+        f"In episode {episode} the values diverged ({TD_METHODS[method]}): states that come again "
+        "and again pile up a trace, and a surprise moves them too far. Take a smaller step size or "
         "trace decay, or the method True online, and reset."
     )

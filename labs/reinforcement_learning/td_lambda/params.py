@@ -12,7 +12,7 @@ from labs.reinforcement_learning.td_lambda.tasks import Place, grid_place, walk_
 from labs.tasks.grid_world.map import MAPS, grid_world
 from labs.tasks.grid_world.params import MAP_LENGTH, MapText
 
-METHODS = {
+TD_METHODS = {
     "n-step": "n-step TD",
     "forward": "Forward view",
     "backward": "Backward view",
@@ -30,7 +30,7 @@ NUMBERS = {
 }
 """Of the methods in labs/algorithms/prediction.py."""
 LAMBDA_METHODS = ("forward", "backward", "true-online")
-OFFLINE_METHODS = tuple(name for name in METHODS if name != "true-online")
+OFFLINE_METHODS = tuple(name for name in TD_METHODS if name != "true-online")
 """That may take all updates of an episode at its end."""
 DIVERGED = 1e6
 """Times the largest cost-to-go: what no estimate reaches that converges."""
@@ -87,10 +87,10 @@ class TdLambdaParams(Params):
     gamma: float = WORLD.knob(1.0, 0.0, 1.0, r"\gamma", "", "Discount", step=0.01)
     """Of the next step's cost."""
 
-    method: str = LEARNING.choice("backward", METHODS, "Method", effect="restart", key=True)
+    method: str = LEARNING.choice("backward", TD_METHODS, "Method", effect="restart", key=True)
     """Blue in the scene; the family of step sizes is its."""
     second: str = LEARNING.choice(
-        "none", {"none": "None", **METHODS}, "Second", effect="restart", key=True
+        "none", {"none": "None", **TD_METHODS}, "Second", effect="restart", key=True
     )
     """Orange. Both meet the same episodes."""
     n: float = LEARNING.knob(4, 1, 64, "n", "", "Steps", step=1, key=True, when=_either(["n-step"]))

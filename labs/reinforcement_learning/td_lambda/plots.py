@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from labs.plots import Bars, Curves, HeatMap, Line, Note, Plot, Readout, TimeSeries, Trace
-from labs.reinforcement_learning.td_lambda.params import METHODS, TdLambdaParams
+from labs.reinforcement_learning.td_lambda.params import TD_METHODS, TdLambdaParams
 from labs.reinforcement_learning.td_lambda.sweep import (
     ALPHAS,
     Sweep,
@@ -16,7 +16,7 @@ from labs.reinforcement_learning.td_lambda.sweep import (
 from labs.reinforcement_learning.td_lambda.tasks import Place
 
 ORDER = ("first", "second")
-SECOND = {"second": tuple(METHODS)}
+SECOND = {"second": tuple(TD_METHODS)}
 WALK, GRID = {"system": ("walk",)}, {"system": ("grid",)}
 FAMILIES = {"method": ("n-step", "forward", "backward", "true-online")}
 ABOVE = 1.1

@@ -8,7 +8,7 @@ import pytest
 
 from labs.algorithms import riccati, sqp
 from labs.algorithms.multiple_shooting import MultipleShooting
-from labs.algorithms.shooting_steps import METHODS
+from labs.algorithms.shooting_steps import SHOOTING_METHODS
 from labs.algorithms.single_shooting import SingleShooting
 from labs.algorithms.sqp import Iterate, Options
 from labs.errors import LabError
@@ -182,7 +182,7 @@ def test_so_does_that_of_the_ur5_with_limits_of_every_kind_active() -> None:
 
 
 @pytest.mark.parametrize("segments", [1, 4, 10])
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", SHOOTING_METHODS)
 def test_a_linear_quadratic_problem_takes_one_step_and_is_riccatis(
     method: str, segments: int
 ) -> None:

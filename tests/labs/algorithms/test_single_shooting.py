@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from labs.algorithms import riccati
-from labs.algorithms.shooting_steps import FORMS, METHODS, CostForm
+from labs.algorithms.shooting_steps import FORMS, SHOOTING_METHODS, CostForm
 from labs.algorithms.single_shooting import SingleShooting
 from labs.errors import LabError
 from labs.models.mechanisms import mechanism
@@ -42,7 +42,7 @@ def constrained(rng: np.random.Generator, name: str) -> SingleShooting:
 
 
 @pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", SHOOTING_METHODS)
 def test_sensitivities_and_gradients_by_finite_differences(method: str, form: CostForm) -> None:
     rng = np.random.default_rng(1)
     p = nonlinear(rng, "double-pendulum", T_limits=(0.1, 3.0))
@@ -103,7 +103,7 @@ def test_the_hessians_meet_where_the_model_is_linear(form: CostForm) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", SHOOTING_METHODS)
 def test_one_newton_step_is_riccati(method: str, form: CostForm) -> None:
     rng = np.random.default_rng(4)
     cost = Quadratic(np.diag([2.0, 0.1]), np.array([[0.5]]), np.diag([9.0, 3.0]), np.zeros(2))
@@ -145,7 +145,7 @@ def test_least_energy_over_a_metre_has_its_closed_form() -> None:
     assert np.log2(excess[0] / excess[1]) == pytest.approx(2.0, abs=0.02)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", SHOOTING_METHODS)
 def test_errors_fall_at_the_order_of_the_method(method: str) -> None:
     """Of state and cost, over M with N fixed; the notes' sum is of order 1 whatever the method."""
     p = nonlinear(np.random.default_rng(5), "pendulum")
@@ -166,7 +166,7 @@ def test_errors_fall_at_the_order_of_the_method(method: str) -> None:
         off = np.linalg.norm(shooting.rollout(y).X[-1] - X)
         return np.array([off, abs(shooting.cost(y) - J)])
 
-    order, M = METHODS[method].order, 16 if method == "rk4" else 400
+    order, M = SHOOTING_METHODS[method].order, 16 if method == "rk4" else 400
     orders = np.log2(errors(M, "augmented") / errors(2 * M, "augmented"))
     np.testing.assert_allclose(orders, order, atol=0.1)
     assert np.log2(errors(400, "sum") / errors(800, "sum"))[-1] == pytest.approx(1.0, abs=0.1)

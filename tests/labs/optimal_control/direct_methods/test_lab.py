@@ -7,7 +7,7 @@ from labs.algorithms import sqp
 from labs.algorithms.single_shooting import SingleShooting
 from labs.engine.catalog import find
 from labs.engine.run import World
-from labs.optimal_control.direct_methods.methods import METHODS, transcribe
+from labs.optimal_control.direct_methods.methods import TRANSCRIPTIONS, transcribe
 from labs.optimal_control.direct_methods.params import DirectMethodsParams
 from labs.optimal_control.direct_methods.race import verdict
 from labs.scene import NullScene
@@ -136,7 +136,7 @@ def test_the_scene_shows_three_plans_or_one_played() -> None:
     world = solved({"system": "upright", "segments": 10.0})
     scene = NullScene()
     world.lab.draw(scene, world.params, world.state)
-    assert {f"robot of {name}" for name in METHODS} <= set(scene.names)
+    assert {f"robot of {name}" for name in TRANSCRIPTIONS} <= set(scene.names)
     assert "open loop" not in scene.names
     scene = NullScene()
     world.lab.draw(scene, world.params.change({"view": "played"}), world.state)

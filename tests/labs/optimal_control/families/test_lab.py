@@ -138,7 +138,7 @@ def test_motions_are_played_rest_and_start_over() -> None:
     assert isinstance(world.state, FamiliesState)
     assert world.state.clock > 0
     world.lab.draw(scene, world.params, world.state)
-    assert {f"state of {name}" for name in side_by_side.METHODS} <= set(scene.names)
+    assert {f"state of {name}" for name in side_by_side.FAMILY_NAMES} <= set(scene.names)
     now = world.lab.fields(world.params, world.state)
     np.testing.assert_array_equal(now["now_t"], 0.5)
     world.advance()

@@ -25,7 +25,7 @@ from labs.reinforcement_learning.td_lambda.live import (
     n_step_returns,
     return_weights,
 )
-from labs.reinforcement_learning.td_lambda.params import METHODS, NUMBERS, TdLambdaParams
+from labs.reinforcement_learning.td_lambda.params import NUMBERS, TD_METHODS, TdLambdaParams
 from labs.reinforcement_learning.td_lambda.sweep import ALPHAS, DECAYS, STEPS
 from labs.tasks.grid_world.map import MAPS, grid_world
 from labs.tasks.grid_world.picture import board
@@ -199,7 +199,7 @@ def some_params(**changes: Value) -> TdLambdaParams:
 
 @pytest.mark.parametrize("system", ["walk", "grid"])
 @pytest.mark.parametrize("offline", [False, True])
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", TD_METHODS)
 def test_walking_learns_what_the_algorithms_learn(method: str, offline: bool, system: str) -> None:
     """Of the same three episodes; and no method learns from what has not happened yet."""
     params = some_params(method=method, offline=offline, system=system, alpha=0.2, n=3)
@@ -234,7 +234,7 @@ def test_n_step_td_learns_as_its_costs_come() -> None:
     assert after[10] == pytest.approx(1.0 + 0.5 * (1.0 + 2.0 + 0.8 - 1.0))
 
 
-@pytest.mark.parametrize("method", [name for name in METHODS if name != "true-online"])
+@pytest.mark.parametrize("method", [name for name in TD_METHODS if name != "true-online"])
 @pytest.mark.parametrize("gamma", [1.0, 0.9])
 def test_the_credit_of_every_step_adds_up_to_the_update(method: str, gamma: float) -> None:
     """Offline, V changes by alpha times the sum over all steps of delta_t e_t, by any method."""
@@ -261,7 +261,7 @@ def test_the_trace_of_true_online_is_its_update_before_anything_was_learned() ->
     assert e.max() <= 1.0 / 0.5
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", TD_METHODS)
 @pytest.mark.parametrize("ahead", [0, 1, 2, 40])
 def test_weights_and_returns_make_the_target(method: str, ahead: int) -> None:
     """The weights sum to 1, and of a state met once the weighted returns are its target."""

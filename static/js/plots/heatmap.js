@@ -28,8 +28,8 @@ export class HeatMap {
 
   update(fields) {
     const { x, y, z, arrows } = this.plot;
-    if (!fields[z]) return;
-    this.data = { x: fields[x], y: fields[y], z: fields[z], arrows: arrows ? fields[arrows] : [] };
+    if (![x, y, z].every((name) => fields[name])) return; // those of another plot, while this one is hidden
+    this.data = { x: fields[x], y: fields[y], z: fields[z], arrows: fields[arrows] ?? [] };
     this.labels = [this.plot.x_label, this.plot.y_label, this.plot.z_label].map((text) => fill(text, fields));
     this.draw();
   }

@@ -54,10 +54,6 @@ class ApproximationParams(Params):
 
     world: str = WORLD.choice("walk", WORLDS, "World", key=True)
     """What is approximated: the value of a policy, an optimal Q, or something made to go wrong."""
-    gamma: float = WORLD.knob(
-        0.99, 0.0, 1.0, r"\gamma", "", "Discount", step=0.01, key=True, when=BOOTSTRAPPED
-    )
-    """Of the next state's value."""
     ending: float = WORLD.knob(
         0.1, 0.0, 1.0, "p", "", "Chance to end", step=0.01,
         when=({"world": "pair", "bootstrap": True}, {"world": "pair", "off_policy": False}),
@@ -165,6 +161,10 @@ class ApproximationParams(Params):
     """The target is l + γ v(x', w); else the true cost-to-go."""
     off_policy: bool = TOGETHER.toggle(True, "Off-policy", key=True, when=TRIAD)
     """States come as often as another policy than the one judged visits them."""
+    gamma: float = WORLD.knob(
+        0.99, 0.0, 1.0, r"\gamma", "", "Discount", step=0.01, key=True, when=BOOTSTRAPPED
+    )
+    """Of the next state's value."""
     correct: bool = TOGETHER.toggle(
         False, "Gradient correction (TDC)", key=True, when={**TRIAD, "bootstrap": True}
     )

@@ -178,7 +178,7 @@ def test_so_does_that_of_the_ur5_with_limits_of_every_kind_active() -> None:
     assert active[program.segments.controls].any(), "controls"
     named = [program.inequality_name(int(i)) for i in np.nonzero(at.active_inequalities)[0]]
     assert any("the tip's distance from obstacle 1" in name for name in named)
-    assert any("bound of x_1 at the end" in name for name in named), "a position"
+    assert any("bound of q_1 at the end" in name for name in named), "a position"
 
 
 @pytest.mark.parametrize("segments", [1, 4, 10])

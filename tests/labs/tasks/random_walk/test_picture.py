@@ -38,7 +38,7 @@ def test_the_ends_wear_their_costs_and_the_walker_is_between_its_cells() -> None
     assert (scene.colors[ROW][0, 1:-1] == 0.5).all()
     assert scene.labels["left end"] == "1"
     assert "".join(scene.labels[f"state {name}"] for name in "ADGJMPS") == "ADGJMPS"
-    assert scene.labels["right end"] == "−1"
+    assert scene.labels["right end"] == "-1"
     between = cell_places(NINETEEN)[2:4, 0].mean()
     assert scene.points["walker"][0] == pytest.approx(between)
     scene = Drawn()

@@ -86,22 +86,23 @@ def _held(qp: QuadraticProgram, active: ActiveSet, tolerance: float) -> Solution
     free = active.bounds == 0.0
     x = np.where(active.bounds > 0.0, qp.upper, np.where(free, 0.0, qp.lower))
     P_parts, B_parts = _parts(qp.P), _parts(B)
-    variables, rows, size, width = _order(*P_parts, *B_parts, len(b), free)
+    variables, rows, size, width = _order(P_parts, B_parts, len(b), free)
     if size < NARROW * width:
         return None
-    band = _band(*P_parts, *B_parts, variables, rows, size, width)
+    band = _band(P_parts, B_parts, variables, rows, size, width)
     factors, pivots, singular = dgbtrf(band.T, width, width, overwrite_ab=1)
     if singular:
         return None
     y, step, places = np.zeros(len(b)), np.empty(size), variables[free]
     for _ in range(REFINEMENTS):
-        step[places] = -(qp.P @ x + qp.q + B.T @ y)[free]
+        pull = -(qp.P @ x + qp.q + B.T @ y)
+        step[places] = pull[free]
         step[rows] = b - B @ x
         missed = np.abs(step).max(initial=0.0)
         if missed <= tolerance:
             z, z_bounds = np.zeros(len(qp.h)), np.zeros(len(x))
             z[active.inequalities] = y[m:]
-            z_bounds[~free] = -(qp.P @ x + qp.q + B.T @ y)[~free]
+            z_bounds[~free] = pull[~free]
             return Solution(x, False, y[:m], z, z_bounds)
         step, _ = dgbtrs(factors, width, width, step, pivots)
         x[free] += step[places]
@@ -121,21 +122,22 @@ def _revised(
     return ActiveSet(bounds, (active.inequalities & (found.z >= -tolerance)) | over)
 
 
-def _parts(of: csc_array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where its columns begin, the rows of their entries, and these."""
-    return of.indptr.astype(np.int32), of.indices.astype(np.int32), of.data.astype(float)
+class _Parts(NamedTuple):
+    """Of a sparse matrix, by columns."""
+
+    start: np.ndarray
+    """Where each column begins among the entries."""
+    row: np.ndarray
+    value: np.ndarray
+
+
+def _parts(of: csc_array) -> _Parts:
+    return _Parts(of.indptr.astype(np.int32), of.indices.astype(np.int32), of.data.astype(float))
 
 
 @compiled
 def _order(
-    P_start: np.ndarray,
-    P_row: np.ndarray,
-    P: np.ndarray,
-    B_start: np.ndarray,
-    B_row: np.ndarray,
-    B: np.ndarray,
-    m: int,
-    free: np.ndarray,
+    P: _Parts, B: _Parts, m: int, free: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, int, int]:
     """Where each free variable (n,), others at -1, and each row (m,) stands among all of them, how
     many these are, and how far apart two are at most that meet."""
@@ -143,10 +145,10 @@ def _order(
     first, last = np.full(m, n - 1), np.zeros(m, np.int64)
     for j in range(n):
         if free[j]:
-            for k in range(B_start[j], B_start[j + 1]):
-                if B[k] != 0.0:
-                    first[B_row[k]] = min(first[B_row[k]], j)
-                    last[B_row[k]] = max(last[B_row[k]], j)
+            for k in range(B.start[j], B.start[j + 1]):
+                if B.value[k] != 0.0:
+                    first[B.row[k]] = min(first[B.row[k]], j)
+                    last[B.row[k]] = max(last[B.row[k]], j)
     # A row stands behind the variable in its middle; those behind one variable keep their order.
     behind = np.zeros(n + 1, np.int64)
     for i in range(m):
@@ -163,23 +165,19 @@ def _order(
     width = 0
     for j in range(n):
         if free[j]:
-            for k in range(P_start[j], P_start[j + 1]):
-                if P[k] != 0.0 and free[P_row[k]]:
-                    width = max(width, abs(variables[P_row[k]] - variables[j]))
-            for k in range(B_start[j], B_start[j + 1]):
-                if B[k] != 0.0:
-                    width = max(width, abs(rows[B_row[k]] - variables[j]))
+            for k in range(P.start[j], P.start[j + 1]):
+                if P.value[k] != 0.0 and free[P.row[k]]:
+                    width = max(width, abs(variables[P.row[k]] - variables[j]))
+            for k in range(B.start[j], B.start[j + 1]):
+                if B.value[k] != 0.0:
+                    width = max(width, abs(rows[B.row[k]] - variables[j]))
     return variables, rows, place, width
 
 
 @compiled
 def _band(
-    P_start: np.ndarray,
-    P_row: np.ndarray,
-    P: np.ndarray,
-    B_start: np.ndarray,
-    B_row: np.ndarray,
-    B: np.ndarray,
+    P: _Parts,
+    B: _Parts,
     variables: np.ndarray,
     rows: np.ndarray,
     size: int,
@@ -190,13 +188,13 @@ def _band(
     for j in range(len(variables)):
         mine = variables[j]
         if mine >= 0:
-            for k in range(P_start[j], P_start[j + 1]):
-                other = variables[P_row[k]]
-                if other >= 0 and P[k] != 0.0:
-                    band[mine, 2 * width + other - mine] = P[k]
-            for k in range(B_start[j], B_start[j + 1]):
-                if B[k] != 0.0:
-                    apart = rows[B_row[k]] - mine
-                    band[mine, 2 * width + apart] = B[k]
-                    band[rows[B_row[k]], 2 * width - apart] = B[k]
+            for k in range(P.start[j], P.start[j + 1]):
+                other = variables[P.row[k]]
+                if other >= 0 and P.value[k] != 0.0:
+                    band[mine, 2 * width + other - mine] = P.value[k]
+            for k in range(B.start[j], B.start[j + 1]):
+                if B.value[k] != 0.0:
+                    apart = rows[B.row[k]] - mine
+                    band[mine, 2 * width + apart] = B.value[k]
+                    band[rows[B.row[k]], 2 * width - apart] = B.value[k]
     return band

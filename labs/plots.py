@@ -14,8 +14,8 @@ from typing import Any, Literal
 
 from labs.params import Value
 
-When = Mapping[str, tuple[Value, ...]]
-ALWAYS: When = MappingProxyType({})
+ShownWhen = Mapping[str, tuple[Value, ...]]
+ALWAYS: ShownWhen = MappingProxyType({})
 Guide = Literal["none", "imaginary-axis", "left-half-plane", "unit-circle"]
 
 
@@ -42,7 +42,7 @@ class TimeSeries:
     select: str
     stacked: bool
     lead: int
-    when: When
+    when: ShownWhen
 
     def __init__(
         self,
@@ -52,7 +52,7 @@ class TimeSeries:
         select: str = "",
         stacked: bool = False,
         lead: int = 0,
-        when: When = ALWAYS,
+        when: ShownWhen = ALWAYS,
     ) -> None:
         _set(self, title=title, unit=unit, lines=lines, select=select, stacked=stacked, lead=lead)
         _set(self, when=when)
@@ -95,7 +95,7 @@ class Curves:
     guide: Guide
     equal: bool
     gaps: bool
-    when: When
+    when: ShownWhen
 
     def __init__(
         self,
@@ -108,7 +108,7 @@ class Curves:
         guide: Guide = "none",
         equal: bool = False,
         gaps: bool = False,
-        when: When = ALWAYS,
+        when: ShownWhen = ALWAYS,
     ) -> None:
         labels = {"title": title, "x_label": x_label, "y_label": y_label}
         _set(self, **labels, traces=traces, log_x=log_x, log_y=log_y, guide=guide, equal=equal)
@@ -132,7 +132,7 @@ class HeatMap:
     gaps: bool = False
     arrows: str = ""
     downward: bool = False
-    when: When = field(default_factory=dict, kw_only=True)
+    when: ShownWhen = field(default_factory=dict, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ class Matrix:
     unit: str = ""
     shade: bool = False
     rows: str = ""
-    when: When = dataclasses.field(default_factory=dict, kw_only=True)
+    when: ShownWhen = dataclasses.field(default_factory=dict, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -165,7 +165,7 @@ class Bars:
     marks: str = ""
     gaps: bool = False
     names: str = ""
-    when: When = dataclasses.field(default_factory=dict, kw_only=True)
+    when: ShownWhen = dataclasses.field(default_factory=dict, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ class Readout:
     label: str
     unit: str
     whole: bool = False
-    when: When = field(default_factory=dict, kw_only=True)
+    when: ShownWhen = field(default_factory=dict, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -186,7 +186,7 @@ class Note:
 
     title: str
     note: str
-    when: When = field(default_factory=dict, kw_only=True)
+    when: ShownWhen = field(default_factory=dict, kw_only=True)
 
 
 Card = TimeSeries | Curves | HeatMap | Matrix | Bars | Note
@@ -221,7 +221,7 @@ def field_names(plot: Plot) -> tuple[str, ...]:
 
 def is_shown(plot: Plot, params: Mapping[str, Value]) -> bool:
     """Whether a plot is there under these parameters."""
-    when: When = getattr(plot, "when", ALWAYS)
+    when: ShownWhen = getattr(plot, "when", ALWAYS)
     return all(params[name] in values for name, values in when.items())
 
 

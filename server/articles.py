@@ -16,7 +16,7 @@ from markdown_it.token import Token
 from markdown_it.utils import OptionsDict
 from mdit_py_plugins.dollarmath import dollarmath_plugin
 
-from labs.engine.catalog import Entry
+from labs.engine.catalog import CatalogEntry
 from labs.errors import LabError
 from labs.params import Params
 from server import experiments
@@ -37,12 +37,12 @@ class Article:
 
 
 @cache
-def render(entry: Entry) -> Article:
+def render(entry: CatalogEntry) -> Article:
     """The article of a lab, ready for its page. Raises ArticleError naming the article."""
     return render_text(entry, entry.article)
 
 
-def render_text(entry: Entry, text: str) -> Article:
+def render_text(entry: CatalogEntry, text: str) -> Article:
     """As `render`, of a given text."""
     try:
         return _Writer(entry).write(text)
@@ -59,7 +59,7 @@ def words(text: str) -> str:
 class _Writer:
     """Renders one article; collects its experiments in order."""
 
-    def __init__(self, entry: Entry) -> None:
+    def __init__(self, entry: CatalogEntry) -> None:
         self.entry = entry
         self.experiments: list[Experiment] = []
         self.symbols = _Symbols(entry.lab.Params)

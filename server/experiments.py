@@ -52,7 +52,7 @@ from dataclasses import asdict, dataclass, field
 from html import escape
 from typing import Any
 
-from labs.engine.catalog import Entry
+from labs.engine.catalog import CatalogEntry
 from labs.errors import LabError
 from labs.lab import Lab
 from labs.params import Knob, Params, Value
@@ -117,7 +117,7 @@ class Experiment:
         }
 
 
-def read(entry: Entry, source: str, html: Callable[[str], str]) -> Experiment:
+def read(entry: CatalogEntry, source: str, html: Callable[[str], str]) -> Experiment:
     """The experiment that a block's TOML describes; `html` renders its Markdown. Raises
     ArticleError."""
     try:
@@ -125,12 +125,12 @@ def read(entry: Entry, source: str, html: Callable[[str], str]) -> Experiment:
     except tomllib.TOMLDecodeError as error:
         raise ArticleError(f"an experiment is not TOML: {error}") from None
     try:
-        return _Reader(entry.lab, html).read(data)
+        return _ExperimentReader(entry.lab, html).read(data)
     except LabError as error:
         raise ArticleError(f"experiment {data.get('title', '')!r}: {error}") from None
 
 
-class _Reader:
+class _ExperimentReader:
     """Reads and checks the blocks of one lab."""
 
     def __init__(self, lab: Lab[Any, Any], html: Callable[[str], str]) -> None:

@@ -16,7 +16,7 @@ from markupsafe import Markup
 from starlette.types import Scope
 
 from labs import plots
-from labs.engine.catalog import Entry, catalog
+from labs.engine.catalog import CatalogEntry, catalog
 from labs.params import Params
 from server.articles import render, words
 from server.experiments import PACES, WINDOWS
@@ -122,7 +122,7 @@ def vendor(name: str) -> Response:
 # What pages are made of ----------------------------------------------------------------------
 
 
-def lab_data(entry: Entry) -> dict[str, Any]:
+def lab_data(entry: CatalogEntry) -> dict[str, Any]:
     """Everything the page's scripts know about a lab."""
     lab = entry.lab
     return {
@@ -163,9 +163,9 @@ def _groups(params: type[Params]) -> list[tuple[str, list[dict[str, Any]]]]:
     return [(heading, tunables) for heading, tunables in groups.items() if tunables]
 
 
-def _chapters() -> list[tuple[str, str, list[Entry]]]:
+def _chapters() -> list[tuple[str, str, list[CatalogEntry]]]:
     """Chapters that have labs, in the order of the course."""
-    chapters: dict[tuple[str, str], list[Entry]] = {}
+    chapters: dict[tuple[str, str], list[CatalogEntry]] = {}
     for entry in catalog().values():
         chapters.setdefault((entry.chapter, entry.chapter_title), []).append(entry)
     return [(number, title, entries) for (number, title), entries in chapters.items()]

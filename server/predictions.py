@@ -13,7 +13,7 @@ from server.toml_values import check_keys, number, text
 
 
 @dataclass(frozen=True)
-class Choice:
+class ChoiceQuestion:
     """Which of these happens? `answer` is the index of the right one."""
 
     choices: tuple[str, ...]
@@ -23,7 +23,7 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Number:
+class NumberQuestion:
     """How much? The outcome is of a `channel`, or the `answer` where there is none."""
 
     ask: str
@@ -35,7 +35,7 @@ class Number:
 
 
 @dataclass(frozen=True)
-class Curve:
+class CurveQuestion:
     """How does a channel run? Sketched in the plot of this title, over its vertical `range`."""
 
     ask: str
@@ -46,7 +46,7 @@ class Curve:
     kind: Literal["curve"] = "curve"
 
 
-Prediction = Choice | Number | Curve
+Prediction = ChoiceQuestion | NumberQuestion | CurveQuestion
 
 
 def read(
@@ -54,7 +54,7 @@ def read(
 ) -> Prediction:
     """What a block `[predict]` asks; `html` renders its Markdown. Raises ArticleError."""
     try:
-        return _Reader(lab, watch, html).read(data)
+        return _QuestionReader(lab, watch, html).read(data)
     except ArticleError as error:
         raise ArticleError(f"predict: {error}") from None
 
@@ -69,7 +69,7 @@ def find_readout(lab: Lab[Any, Any], key: str, label: str) -> Readout:
     return readouts[label]
 
 
-class _Reader:
+class _QuestionReader:
     def __init__(
         self, lab: Lab[Any, Any], watch: tuple[str, ...], html: Callable[[str], str]
     ) -> None:
@@ -81,7 +81,7 @@ class _Reader:
             return self._choice(data)
         return self._curve(data) if "curve" in data else self._amount(data)
 
-    def _choice(self, data: dict[str, Any]) -> Choice:
+    def _choice(self, data: dict[str, Any]) -> ChoiceQuestion:
         check_keys(data, ("choices", "answer"), ("ask",))
         choices, answer = data["choices"], data["answer"]
         if not isinstance(choices, list) or not all(isinstance(c, str) and c for c in choices):
@@ -93,11 +93,11 @@ class _Reader:
                 f"answer = {answer!r}: takes a whole number, 0 to {len(choices) - 1}"
             )
         ask = self._inline(text(data, "ask", ""))
-        return Choice(
+        return ChoiceQuestion(
             tuple(self._inline(text({"choices": c}, "choices")) for c in choices), answer, ask
         )
 
-    def _amount(self, data: dict[str, Any]) -> Number:
+    def _amount(self, data: dict[str, Any]) -> NumberQuestion:
         sources = ("readout", "channel", "answer")
         check_keys(data, ("ask", "unit"), (*sources, "of"))
         given = [source for source in sources if source in data]
@@ -117,9 +117,9 @@ class _Reader:
         unit = data["unit"]
         if not isinstance(unit, str):
             raise ArticleError("unit has the wrong type: it takes a text, which may be empty")
-        return Number(self._inline(text(data, "ask")), unit, channel, of, answer)
+        return NumberQuestion(self._inline(text(data, "ask")), unit, channel, of, answer)
 
-    def _curve(self, data: dict[str, Any]) -> Curve:
+    def _curve(self, data: dict[str, Any]) -> CurveQuestion:
         check_keys(data, ("ask", "curve", "range"), ())
         channel = text(data, "curve")
         series = self._check_channel(channel, watched=True)
@@ -129,7 +129,7 @@ class _Reader:
             raise ArticleError(f"range = {span!r}: takes two numbers, [lowest, highest]")
         place = (float(span[0]), float(span[1]))
         ask = self._inline(text(data, "ask"))
-        return Curve(ask, series.unit, channel, series.title, place)
+        return CurveQuestion(ask, series.unit, channel, series.title, place)
 
     def _check_channel(self, channel: str, watched: bool = False) -> TimeSeries:
         """The time series that shows it. That it has this component, a test of every lab asks."""
@@ -152,14 +152,14 @@ def form(predict: Prediction | None, number: int) -> str:
     match predict:
         case None:
             return ""
-        case Choice(choices=choices, ask=ask):
+        case ChoiceQuestion(choices=choices, ask=ask):
             inside = "".join(
                 f'<button type="button" data-choice="{i}" aria-pressed="false">'
                 f"<span>{text}</span></button>\n"
                 for i, text in enumerate(choices)
             )
             return _form("choice", ask or "Your guess", inside, number)
-        case Number(ask=ask, unit=unit):
+        case NumberQuestion(ask=ask, unit=unit):
             inside = f"""<input type="text" inputmode="decimal" autocomplete="off"
  spellcheck="false" aria-labelledby="ask-{number} unit-{number}">
 <span id="unit-{number}">{escape(unit)}</span>
@@ -167,7 +167,7 @@ def form(predict: Prediction | None, number: int) -> str:
 <p class="wrong" role="alert" hidden></p>
 """
             return _form("number", ask, inside, number)
-        case Curve(ask=ask):
+        case CurveQuestion(ask=ask):
             return _form("curve", ask, '<button type="button">Sketch</button>\n', number)
 
 

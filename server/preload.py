@@ -7,7 +7,7 @@ import threading
 
 import server.worker  # noqa: F401  (imports Viser, Pinocchio and all labs' code)
 from labs import compiled
-from labs.engine.catalog import Entry, catalog
+from labs.engine.catalog import CatalogEntry, catalog
 from labs.errors import LabError
 from labs.models.arms import ARMS, load
 from server import fork_server, meshes
@@ -45,7 +45,7 @@ def _prepare() -> None:
         waiting.join()  # a process with a second thread had better not be forked
 
 
-def _entries() -> list[Entry]:
+def _entries() -> list[CatalogEntry]:
     try:
         return list(catalog().values())
     except LabError:

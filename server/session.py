@@ -8,7 +8,7 @@ from typing import Any
 
 import orjson
 
-from labs.engine.catalog import Entry
+from labs.engine.catalog import CatalogEntry
 from labs.errors import LabError
 from labs.params import Params
 from server.messages import Notice, SessionInfo, View
@@ -29,7 +29,7 @@ class Session:
 
     def __init__(
         self,
-        entry: Entry,
+        entry: CatalogEntry,
         params: Params,
         seed: int,
         view: View,

@@ -3,7 +3,7 @@
 import asyncio
 import contextlib
 
-from labs.engine.catalog import Entry
+from labs.engine.catalog import CatalogEntry
 from labs.engine.links import read_link
 from labs.errors import LabError
 from labs.params import Params
@@ -54,7 +54,7 @@ class Sessions:
                 while any(session.viewers for session in sessions):
                     await asyncio.sleep(0.01)
 
-    async def create(self, entry: Entry, new: NewSession) -> Session:
+    async def create(self, entry: CatalogEntry, new: NewSession) -> Session:
         """A new session. Raises SessionsFull, ParameterError."""
         # Texts are read by the lab's own code: not on the event loop.
         params, seed, remarks = await asyncio.to_thread(_read, entry.lab.Params(), new)

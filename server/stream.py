@@ -27,7 +27,7 @@ ENDED, TOO_LARGE = 4404, 1009
 
 router = APIRouter()
 
-Reference = Annotated[int, Field(ge=0, le=2**53)]
+RequestNumber = Annotated[int, Field(ge=0, le=2**53)]
 """Comes back with the answer."""
 
 
@@ -35,7 +35,7 @@ class SetParams(Message):
     """New values of some parameters, all or none."""
 
     type: Literal["params"]
-    ref: Reference
+    ref: RequestNumber
     changes: Changes
 
 
@@ -43,14 +43,14 @@ class Do(Message):
     """A command."""
 
     type: Literal["command"]
-    ref: Reference
+    ref: RequestNumber
     command: Command
 
 
 class _Referenced(BaseModel):
     """Of a message that is otherwise wrong, what its answer belongs to."""
 
-    ref: Reference = 0
+    ref: RequestNumber = 0
 
 
 _request: TypeAdapter[SetParams | Do] = TypeAdapter(

@@ -24,6 +24,7 @@ SHARED = {"tasks", "models", "problems"}
 LINES = {"lab.py": 350}
 """What a file may have at most, if not MOST_LINES."""
 MOST_LINES = 300
+CAMEL_CASE = re.compile(r"_?[A-Z]\w*[a-z]\w*")
 
 
 def sources(*folders: str) -> list[Path]:
@@ -60,6 +61,20 @@ def docstring(path: Path) -> str:
 
 
 MODULES = {module_of(path): path for path in sources("labs", "server", "tests")}
+
+
+def top_level_names(path: Path) -> Iterator[str]:
+    """What a module defines: classes, functions, constants and types."""
+    for node in tree(path).body:
+        match node:
+            case (
+                ast.ClassDef(name=name)
+                | ast.FunctionDef(name=name)
+                | ast.AsyncFunctionDef(name=name)
+            ):
+                yield name
+            case ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)):
+                yield name
 
 
 @functools.cache
@@ -255,6 +270,16 @@ def test_public_names_are_documented() -> None:
         for node in tree(path).body:
             if isinstance(node, ast.ClassDef | ast.FunctionDef) and node.name[0] != "_":
                 assert ast.get_docstring(node), f"{name_of(path)}: {node.name} has no docstring"
+
+
+def test_a_type_has_a_name_of_its_own() -> None:
+    """`PlannedMotion` and `MotionTask`, not two `Motion`: who searches for it finds it."""
+    defined: dict[str, list[str]] = {}
+    for path in sources("labs", "server"):
+        for name in filter(CAMEL_CASE.fullmatch, top_level_names(path)):
+            defined.setdefault(name, []).append(name_of(path))
+    assert len(defined) > 300
+    assert not {name: paths for name, paths in defined.items() if len(paths) > 1}
 
 
 def test_an_algorithm_cites_its_section() -> None:

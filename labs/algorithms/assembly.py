@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array
 
 
-class Terms(NamedTuple):
+class MatrixTerms(NamedTuple):
     """coefficient * sources[source] belongs to entry (row, column); all (number of terms,)."""
 
     row: np.ndarray
@@ -23,7 +23,7 @@ class Terms(NamedTuple):
 class Assembly:
     """A matrix of this shape, the sum of terms over so many sources."""
 
-    def __init__(self, shape: tuple[int, int], sources: int, *terms: Terms) -> None:
+    def __init__(self, shape: tuple[int, int], sources: int, *terms: MatrixTerms) -> None:
         self.shape = shape
         row, column, source, coefficient = (
             np.concatenate(parts) for parts in zip(*terms, strict=True)
@@ -46,11 +46,11 @@ class Assembly:
 
 def block_terms(
     rows: np.ndarray, columns: np.ndarray, first: int, coefficient: float = 1.0
-) -> Terms:
+) -> MatrixTerms:
     """Dense blocks: entry (a, b) of block k belongs to (rows[k, a], columns[k, b]), and its
     sources come one after the other, block by block and row by row, from `first` on."""
     shape = (*rows.shape, columns.shape[1])
     row = np.broadcast_to(rows[:, :, None], shape).ravel()
     column = np.broadcast_to(columns[:, None, :], shape).ravel()
     source = first + np.arange(row.size)
-    return Terms(row, column, source, np.full(row.size, coefficient))
+    return MatrixTerms(row, column, source, np.full(row.size, coefficient))

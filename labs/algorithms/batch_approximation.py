@@ -33,7 +33,7 @@ from labs.resumable import Resumable, pieces
 REPLAY_MC, REPLAY_TD = range(2)
 
 
-class Transitions(NamedTuple):
+class TransitionBatch(NamedTuple):
     """A replay buffer of N transitions."""
 
     x: np.ndarray
@@ -48,10 +48,10 @@ class Transitions(NamedTuple):
     """(N,) J_t; of an episode that was cut, as far as it went."""
 
 
-def collect_transitions(task: PredictionTask, random: np.ndarray, episodes: int) -> Transitions:
+def collect_transitions(task: PredictionTask, random: np.ndarray, episodes: int) -> TransitionBatch:
     """What happens in so many episodes. `random` (4,) uint64 changes in place."""
     (x, u, y), (cost, returns) = _collect(task, random, episodes)
-    return Transitions(x, u, cost, y, returns)
+    return TransitionBatch(x, u, cost, y, returns)
 
 
 @compiled
@@ -77,7 +77,7 @@ def _collect(
     return indices[:, :met].copy(), numbers[:, :met].copy()
 
 
-def least_squares_fit(features: Features, batch: Transitions) -> np.ndarray:
+def least_squares_fit(features: Features, batch: TransitionBatch) -> np.ndarray:
     """w (d,) of the least squares fit, the shortest where there are several."""
     return _fit(features, batch.x, batch.returns)
 
@@ -101,7 +101,7 @@ def _apart(features: Features) -> bool:
     return bool(features.active.shape[1] == 1)
 
 
-def lstd(features: Features, batch: Transitions, gamma: float) -> np.ndarray:
+def lstd(features: Features, batch: TransitionBatch, gamma: float) -> np.ndarray:
     """w (d,) of LSTD, the shortest of least residual where there are several or none."""
     states, few = len(features.active), 4 * features.active.shape[1] < features.size
     phi = features.sparse if few else features.dense
@@ -135,7 +135,7 @@ def _chain_solution(A: scipy.sparse.csc_array, b: np.ndarray) -> np.ndarray | No
 
 
 def fitted_q_iteration(
-    features: Features, batch: Transitions, gamma: float, w: np.ndarray
+    features: Features, batch: TransitionBatch, gamma: float, w: np.ndarray
 ) -> Resumable[np.ndarray]:
     """The next w (U, d): for each control a fit to the targets of its own transitions. A control
     that was never tried keeps its weights."""
@@ -151,7 +151,7 @@ def fitted_q_iteration(
 
 def replay(
     features: Features,
-    batch: Transitions,
+    batch: TransitionBatch,
     gamma: float,
     rule: UpdateRule,
     method: int,
@@ -172,7 +172,7 @@ def replay(
 
 def replay_q_learning(
     features: Features,
-    batch: Transitions,
+    batch: TransitionBatch,
     gamma: float,
     rule: UpdateRule,
     w: np.ndarray,
@@ -187,7 +187,7 @@ def replay_q_learning(
 
 def _replayed(
     features: Features,
-    batch: Transitions,
+    batch: TransitionBatch,
     gamma: float,
     rule: UpdateRule,
     bootstrap: bool,
@@ -210,7 +210,7 @@ def _replayed(
 @compiled
 def _replay(
     features: Features,
-    batch: Transitions,
+    batch: TransitionBatch,
     gamma: float,
     rule: UpdateRule,
     bootstrap: bool,

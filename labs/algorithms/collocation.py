@@ -18,17 +18,17 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import csc_array
 
-from labs.algorithms.collocation_grid import Grid
+from labs.algorithms.collocation_grid import CollocationGrid
 from labs.algorithms.collocation_patterns import patterns
 from labs.algorithms.collocation_schemes import SCHEMES
 from labs.algorithms.curvature import weighted_constraint_curvature, weighted_curvature
 from labs.errors import LabError
 from labs.problems.continuous_control import ContinuousProblem
-from labs.problems.nonlinear_program import Derivatives, Values
+from labs.problems.nonlinear_program import ProgramDerivatives, ProgramValues
 from labs.resumable import Resumable
 
 
-class Trajectory(NamedTuple):
+class CollocationTrajectory(NamedTuple):
     """What the variables say."""
 
     T: float
@@ -49,7 +49,7 @@ class Collocation:
             raise LabError(f"N = {N}: a grid has at least one step")
         nx, nu = problem.dynamics.nx, problem.dynamics.nu
         self.problem, self.N, self.scheme = problem, N, SCHEMES[scheme]
-        self.grid = Grid(self.scheme, N, nx, nu)
+        self.grid = CollocationGrid(self.scheme, N, nx, nu)
         self.free_time = problem.T_limits is not None
         self.n = self.grid.n + self.free_time
         x_final = np.full(nx, np.nan) if problem.x_final is None else problem.x_final
@@ -68,9 +68,9 @@ class Collocation:
         """T [s]."""
         return float(y[-1]) if self.free_time else self.problem.T
 
-    def trajectory(self, y: np.ndarray) -> Trajectory:
+    def trajectory(self, y: np.ndarray) -> CollocationTrajectory:
         """Of the variables (n,)."""
-        return Trajectory(self.horizon(y), y[self.grid.nodes], y[self.grid.controls])
+        return CollocationTrajectory(self.horizon(y), y[self.grid.nodes], y[self.grid.controls])
 
     def variables(self, X: np.ndarray, U: np.ndarray, T: float | None = None) -> np.ndarray:
         """(n,) of a trajectory X (N + 1, nx), U (N, nu), as a first guess: between grid points
@@ -90,7 +90,7 @@ class Collocation:
 
     # The programme ---------------------------------------------------------------------------
 
-    def values(self, y: np.ndarray) -> Values:
+    def values(self, y: np.ndarray) -> ProgramValues:
         """At y (n,)."""
         problem, T = self.problem, self.horizon(y)
         nodes, (X, U) = y[self.grid.nodes], self._points(y)
@@ -104,9 +104,9 @@ class Collocation:
             c = np.concatenate([nodes[0] - problem.x0, defects, ends, e])
             g = problem.path.values(nodes).ravel() if problem.path else np.zeros(0)
         sound = np.isfinite(f) and np.isfinite(c).all() and np.isfinite(g).all()
-        return Values(f if sound else np.inf, c, g)
+        return ProgramValues(f if sound else np.inf, c, g)
 
-    def derivatives(self, y: np.ndarray) -> Derivatives:
+    def derivatives(self, y: np.ndarray) -> ProgramDerivatives:
         """At y (n,)."""
         problem, grid, T = self.problem, self.grid, self.horizon(y)
         nodes, (X, U) = y[grid.nodes], self._points(y)
@@ -124,7 +124,7 @@ class Collocation:
             sources.append(problem.end.jacobians(nodes[-1:]).ravel())
         by_path = problem.path.jacobians(nodes).ravel() if problem.path else np.zeros(0)
         c_y = self._c_y.matrix(np.concatenate(sources))
-        return Derivatives(f_y, c_y, self._g_y.matrix(by_path))
+        return ProgramDerivatives(f_y, c_y, self._g_y.matrix(by_path))
 
     def hessian(
         self, y: np.ndarray, lam: np.ndarray, mu: np.ndarray, exact: bool

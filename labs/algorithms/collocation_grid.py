@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 from labs.algorithms.collocation_schemes import Scheme
 
 
-class Grid:
+class CollocationGrid:
     """N steps of a scheme, with the variables z (n,) of a trajectory in the order of time."""
 
     def __init__(self, scheme: Scheme, N: int, nx: int, nu: int) -> None:

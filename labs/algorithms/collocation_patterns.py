@@ -7,13 +7,13 @@
 import numpy as np
 from scipy.sparse import csr_array
 
-from labs.algorithms.assembly import Assembly, Terms, block_terms
-from labs.algorithms.collocation_grid import Grid
+from labs.algorithms.assembly import Assembly, MatrixTerms, block_terms
+from labs.algorithms.collocation_grid import CollocationGrid
 from labs.problems.continuous_control import ContinuousProblem
 
 
 def patterns(
-    problem: ContinuousProblem, grid: Grid, starts: np.ndarray, ends: np.ndarray
+    problem: ContinuousProblem, grid: CollocationGrid, starts: np.ndarray, ends: np.ndarray
 ) -> tuple[Assembly, Assembly, Assembly]:
     """Of c_y, g_y and the Hessian. `starts`: where x_0, defects, the components `ends` of x_T, and
     e begin among the equalities, and how many there are.
@@ -33,12 +33,14 @@ def patterns(
     ]
     of_W, of_E = _pairs(W.col // nx, E.row // b, points)
     source = 1 + W.col[of_W] * b + E.row[of_E] % b
-    terms.append(Terms(starts[1] + W.row[of_W], E.col[of_E], source, -W.data[of_W] * E.data[of_E]))
+    terms.append(
+        MatrixTerms(starts[1] + W.row[of_W], E.col[of_E], source, -W.data[of_W] * E.data[of_E])
+    )
     sources = 1 + points * nx * b
     if free:
         rows = np.arange(grid.rows.size)
         by_T = np.full(len(rows), n - 1)
-        terms.append(Terms(starts[1] + rows, by_T, sources + rows, np.full(len(rows), -1.0)))
+        terms.append(MatrixTerms(starts[1] + rows, by_T, sources + rows, np.full(len(rows), -1.0)))
         sources += len(rows)
     if problem.end:
         rows = np.arange(starts[3], starts[4])
@@ -53,22 +55,22 @@ def patterns(
     left, right = _pairs(E.row // b, E.row // b, points)
     source = E.row[left] * b + E.row[right] % b
     terms = [
-        Terms(E.col[left], E.col[right], source, E.data[left] * E.data[right]),
+        MatrixTerms(E.col[left], E.col[right], source, E.data[left] * E.data[right]),
         block_terms(grid.nodes, grid.nodes, points * b * b),
     ]
     sources = points * b * b + len(grid.nodes) * nx * nx
     if free:
         by_T = np.full(E.nnz, n - 1)
-        terms.append(Terms(E.col, by_T, sources + E.row, E.data))
-        terms.append(Terms(by_T, E.col, sources + E.row, E.data))
+        terms.append(MatrixTerms(E.col, by_T, sources + E.row, E.data))
+        terms.append(MatrixTerms(by_T, E.col, sources + E.row, E.data))
         terms.append(_ones(np.array([n - 1]), np.array([n - 1]), np.zeros(1)))
         sources += points * b
     return c_y, g_y, Assembly((n, n), sources, *terms)
 
 
-def _ones(rows: np.ndarray, columns: np.ndarray, coefficients: np.ndarray) -> Terms:
+def _ones(rows: np.ndarray, columns: np.ndarray, coefficients: np.ndarray) -> MatrixTerms:
     """Constants: coefficients times the first source."""
-    return Terms(rows, columns, np.zeros(len(rows), int), coefficients)
+    return MatrixTerms(rows, columns, np.zeros(len(rows), int), coefficients)
 
 
 def _pairs(left: np.ndarray, right: np.ndarray, keys: int) -> tuple[np.ndarray, np.ndarray]:

@@ -12,10 +12,9 @@ from collections.abc import Callable
 
 import numpy as np
 
+from labs.algorithms.sensitivities import Derivatives
 from labs.resumable import Resumable
 
-Derivatives = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
-"""(X, U) to f (k, nx), f_x (k, nx, nx), f_u (k, nx, nu)."""
 EPSILON = 1e-5
 """Of the differences, in parts of what is varied or of 1."""
 

@@ -44,7 +44,7 @@ ROUNDING = 1e-14
 
 
 @dataclass(frozen=True)
-class Options:
+class DdpOptions:
     """How the iterations go; the names are those of the notes. Raises LabError."""
 
     second_order: bool = False
@@ -74,7 +74,7 @@ class Options:
 
 
 @dataclass(frozen=True, eq=False)
-class Iterate:
+class DdpIterate:
     """Where the solver is. Arrays are never written into again."""
 
     X: np.ndarray
@@ -108,7 +108,7 @@ class Iterate:
     """About (X, U), where it is known already."""
 
 
-def init(problem: OptimalControlProblem, U: np.ndarray, options: Options) -> Iterate:
+def init(problem: OptimalControlProblem, U: np.ndarray, options: DdpOptions) -> DdpIterate:
     """The first guess U (N, nu), rolled out. Raises LabError if its shape does not fit."""
     N, nu, nx = problem.N, problem.dynamics.nu, problem.dynamics.nx
     if U.shape != (N, nu):
@@ -117,17 +117,17 @@ def init(problem: OptimalControlProblem, U: np.ndarray, options: Options) -> Ite
     X, U, cost = rollout(problem, np.zeros((N + 1, nx)), guess, gains)
     diverged = f"The first guess diverges at step {diverges_at(X)} of {N}; start from another."
     stopped = "" if np.isfinite(cost) else diverged
-    return Iterate(X, U, cost, np.zeros((N, nu)), gains, options.mu, stopped=stopped)
+    return DdpIterate(X, U, cost, np.zeros((N, nu)), gains, options.mu, stopped=stopped)
 
 
-def step(problem: OptimalControlProblem, options: Options, at: Iterate) -> Iterate:
+def step(problem: OptimalControlProblem, options: DdpOptions, at: DdpIterate) -> DdpIterate:
     """One iteration: expansion, backward pass, line search. What has stopped stays as it is."""
     return run_to_completion(step_in_pieces(problem, options, at))
 
 
 def step_in_pieces(
-    problem: OptimalControlProblem, options: Options, at: Iterate
-) -> Resumable[Iterate]:
+    problem: OptimalControlProblem, options: DdpOptions, at: DdpIterate
+) -> Resumable[DdpIterate]:
     """The same, pausing between pieces of some milliseconds."""
     if at.stopped:
         return at
@@ -164,9 +164,11 @@ def step_in_pieces(
     return replace(at, seconds=seconds)
 
 
-def solve(problem: OptimalControlProblem, U: np.ndarray, options: Options | None = None) -> Iterate:
+def solve(
+    problem: OptimalControlProblem, U: np.ndarray, options: DdpOptions | None = None
+) -> DdpIterate:
     """Iterates from the first guess U (N, nu) until it stops."""
-    options = options or Options()
+    options = options or DdpOptions()
     at = init(problem, U, options)
     while not at.stopped:
         at = step(problem, options, at)
@@ -186,10 +188,10 @@ class Direction(NamedTuple):
 
 def _direction(
     problem: OptimalControlProblem,
-    options: Options,
+    options: DdpOptions,
     allowed: Regularisation,
     model: Expansion,
-    at: Iterate,
+    at: DdpIterate,
 ) -> Direction:
     w, K = np.empty_like(at.w), np.empty_like(at.K)
     low = high = np.empty((0, 0))
@@ -238,12 +240,12 @@ def _direction(
 
 def _search(
     problem: OptimalControlProblem,
-    options: Options,
+    options: DdpOptions,
     allowed: Regularisation,
-    at: Iterate,
+    at: DdpIterate,
     d_1: float,
     d_2: float,
-) -> Resumable[Iterate]:
+) -> Resumable[DdpIterate]:
     """The line search, and mu for the next iteration."""
     more = allowed.grown(at.mu)
     diverged = 0
@@ -282,14 +284,14 @@ def _search(
     )
 
 
-def _iteration_limit_message(at: Iterate) -> str:
+def _iteration_limit_message(at: DdpIterate) -> str:
     return (
         f"Stopped short after {at.iteration} iterations: the last one changed the cost by "
         f"{at.actual:.1e}. Solve again from here to go on."
     )
 
 
-def _convergence_message(at: Iterate) -> str:
+def _convergence_message(at: DdpIterate) -> str:
     return (
         f"Converged after {at.iteration} iteration{'s'[: at.iteration != 1]}: a further step "
         f"would lower the cost by {abs(at.expected):.1e} of {at.cost:.4g}."

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from labs.algorithms.network import Adam, adam_step, backward, forward, no_moments, random_weights
-from labs.algorithms.replay import Replay, Transitions, empty, store
+from labs.algorithms.replay import Minibatch, Replay, empty, store
 from labs.compiled import compiled
 from labs.problems.environment import Environment
 from labs.random_numbers import below, seeded, uniform
@@ -135,7 +135,7 @@ def step(
         X, costs, ends = environment.step(X, U)
         after = environment.observe(X)
         scaled = (costs / options.cost_scale).astype(np.float32)
-        store(agent.replay, Transitions(seen, U, scaled, after, ends))
+        store(agent.replay, Minibatch(seen, U, scaled, after, ends))
         due = (steps + many) // options.update_every - steps // options.update_every
         steps, ages, paid = steps + many, ages + 1, paid + costs
         if steps > options.warm_up and due:

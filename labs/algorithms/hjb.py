@@ -39,7 +39,7 @@ BETWEEN_PAUSES = 4096
 
 
 @dataclass(frozen=True)
-class Grid:
+class StateGrid:
     """Nodes evenly over a rectangle of the plane of states."""
 
     lower: tuple[float, float]
@@ -81,7 +81,7 @@ class ValueFunction:
 
     T: float
     """[s]"""
-    grid: Grid
+    grid: StateGrid
     V: np.ndarray
     """(N + 1, n, m), from t = 0 to T."""
 
@@ -122,7 +122,7 @@ class Characteristics:
     """(n, m, 3)"""
 
 
-def characteristics(problem: ContinuousProblem, grid: Grid, h: float) -> Characteristics:
+def characteristics(problem: ContinuousProblem, grid: StateGrid, h: float) -> Characteristics:
     """Raises LabError where the problem is not of the kind solved here."""
     if (problem.dynamics.nx, problem.dynamics.nu) != (2, 1):
         raise LabError("a value function on a grid is for two states and one control here")
@@ -150,7 +150,7 @@ def characteristics(problem: ContinuousProblem, grid: Grid, h: float) -> Charact
     )
 
 
-def final_values(problem: ContinuousProblem, grid: Grid) -> np.ndarray:
+def final_values(problem: ContinuousProblem, grid: StateGrid) -> np.ndarray:
     """l_f at the nodes (n, m)."""
     return np.array([problem.cost.final(x) for x in grid.nodes]).reshape(grid.shape)
 
@@ -177,7 +177,7 @@ def step(ahead: np.ndarray, way: Characteristics, levels: np.ndarray) -> Resumab
 
 
 def solve(
-    problem: ContinuousProblem, grid: Grid, steps: int, levels: int = 5
+    problem: ContinuousProblem, grid: StateGrid, steps: int, levels: int = 5
 ) -> Resumable[ValueFunction]:
     """V at all instants of so many steps. Pauses now and then."""
     way, tried = characteristics(problem, grid, problem.T / steps), controls(problem, levels)

@@ -21,7 +21,7 @@ from labs.algorithms import linear_mpc_condensed as condensed
 from labs.algorithms import linear_mpc_sparse as sparse
 from labs.algorithms.linear_mpc_condensed import INFEASIBLE, SOLVED, Condensed
 from labs.algorithms.linear_mpc_infeasible import Infeasibility, first_infeasibility
-from labs.algorithms.linear_mpc_limits import KINDS, Terms, TwoSided, sets
+from labs.algorithms.linear_mpc_limits import KINDS, ProblemTerms, TwoSided, sets
 from labs.algorithms.linear_mpc_sparse import Sparse
 from labs.errors import LabError
 from labs.problems.linear_mpc import LinearMpcProblem
@@ -46,7 +46,7 @@ class LinearPlan(Plan):
     """The first step and limit that cannot be met."""
 
 
-class Values(NamedTuple):
+class OptimalValues(NamedTuple):
     """V*_N and the control of many states."""
 
     V: np.ndarray
@@ -76,8 +76,8 @@ class LinearPlanner:
         self.problem, self.form, self.penalty, self.holds = problem, form, penalty, holds
         self._condensed: dict[int, Condensed] = {}
         self._sparse: dict[tuple[int, bool], Sparse] = {}
-        self._condensed_data: dict[int, tuple[Terms, condensed.Data]] = {}
-        self._sparse_data: dict[tuple[int, bool], sparse.Data] = {}
+        self._condensed_data: dict[int, tuple[ProblemTerms, condensed.CondensedData]] = {}
+        self._sparse_data: dict[tuple[int, bool], sparse.SparseData] = {}
 
     def following(self, **terms: np.ndarray | None) -> Self:
         """The same with other terms of the problem: of c, x_ref, u_ref, q, r and the margins,
@@ -116,7 +116,7 @@ class LinearPlanner:
         qp = plan.seconds["QP"]
         return replace(plan, seconds={"QP": qp, "rest": perf_counter() - begun - qp})
 
-    def values(self, X: np.ndarray) -> Resumable[Values]:
+    def values(self, X: np.ndarray) -> Resumable[OptimalValues]:
         """Of the states X (k, n), each solved from the one before: neighbours should follow each
         other. Limits are hard, whatever the penalty, and the form is the condensed one."""
         form, _, data = yield from self._condense(self.problem.N)
@@ -132,7 +132,7 @@ class LinearPlanner:
             if perf_counter() - begun > PIECE:
                 yield
                 begun = perf_counter()
-        return Values(V, u)
+        return OptimalValues(V, u)
 
     # The forms ----------------------------------------------------------------------------------
 
@@ -157,7 +157,7 @@ class LinearPlanner:
         key = N, hard
         if key not in self._sparse:
             self._sparse[key] = Sparse(self.problem, N, None if hard else self.penalty)
-        form, terms = self._sparse[key], Terms.of(self.problem, N)
+        form, terms = self._sparse[key], ProblemTerms.of(self.problem, N)
         if key not in self._sparse_data:
             self._sparse_data[key] = form.data(terms)
         begun = perf_counter()
@@ -183,7 +183,7 @@ class LinearPlanner:
 
     def _made(
         self,
-        terms: Terms,
+        terms: ProblemTerms,
         X: np.ndarray,
         U: np.ndarray,
         multipliers: dict[str, np.ndarray],
@@ -209,7 +209,7 @@ class LinearPlanner:
             multipliers=multipliers,
         )
 
-    def _rollout(self, terms: Terms, x: np.ndarray, U: np.ndarray) -> np.ndarray:
+    def _rollout(self, terms: ProblemTerms, x: np.ndarray, U: np.ndarray) -> np.ndarray:
         """X (N + 1, n) by the dynamics."""
         A, X = self.problem.A, np.empty((terms.N + 1, len(x)))
         driven = U @ self.problem.B.T + terms.c
@@ -218,13 +218,15 @@ class LinearPlanner:
             X[k + 1] = A @ X[k] + driven[k]
         return X
 
-    def _condense(self, N: int) -> Resumable[tuple[Condensed, Terms, condensed.Data]]:
+    def _condense(
+        self, N: int
+    ) -> Resumable[tuple[Condensed, ProblemTerms, condensed.CondensedData]]:
         """The condensed form over N steps, made once, with what this problem puts into it."""
         if N not in self._condensed:
             self._condensed[N] = Condensed(self.problem, N, self.holds)
             yield
         if N not in self._condensed_data:
-            terms = Terms.of(self.problem, N)
+            terms = ProblemTerms.of(self.problem, N)
             self._condensed_data[N] = terms, self._condensed[N].data(terms)
         return self._condensed[N], *self._condensed_data[N]
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import daqp
 import numpy as np
 
-from labs.algorithms.linear_mpc_limits import KINDS, Terms, TwoSided, sets, tolerance
+from labs.algorithms.linear_mpc_limits import KINDS, ProblemTerms, TwoSided, sets, tolerance
 from labs.problems.linear_mpc import LinearMpcProblem, check_holds
 
 SETTINGS = {"primal_tol": 1e-9, "dual_tol": 1e-9, "eq_reduction": -1}
@@ -30,7 +30,7 @@ NO_GRIP = 1e-12
 """A row of G so small, next to its limit's own row, is one on which no control has a grip."""
 
 
-class Data(NamedTuple):
+class CondensedData(NamedTuple):
     """What the terms of a problem make of the programme: all that changes while G and H stay."""
 
     f: np.ndarray
@@ -100,7 +100,7 @@ class Condensed:
         self.grip = np.linalg.norm(self.G, axis=1) > NO_GRIP * size
         self._G = np.ascontiguousarray(self.G[self.grip])
 
-    def data(self, terms: Terms) -> Data:
+    def data(self, terms: ProblemTerms) -> CondensedData:
         """For these terms."""
         N = self.N
         phi = np.zeros((N + 1, len(terms.c)))
@@ -120,7 +120,7 @@ class Condensed:
             shift = values[kind] @ side.H.T
             lower.append((low - shift).ravel())
             upper.append((high - shift).ravel())
-        return Data(
+        return CondensedData(
             np.einsum("kiw,ki->w", self.Gamma, linear) + self.T.T @ controls,
             np.concatenate(lower),
             np.concatenate(upper),
@@ -131,7 +131,7 @@ class Condensed:
         )
 
     def solve(
-        self, data: Data, x: np.ndarray, active: np.ndarray | None
+        self, data: CondensedData, x: np.ndarray, active: np.ndarray | None
     ) -> tuple[int, np.ndarray, np.ndarray, float, int]:
         """DAQP's exit flag, W (w,), the rows' multipliers (rows,), V_N and the iterations, started
         where the rows' `active` sides are 1 (upper) or -1 (lower)."""

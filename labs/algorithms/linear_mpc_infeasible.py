@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import daqp
 import numpy as np
 
-from labs.algorithms.linear_mpc_condensed import SOLVED, Condensed, Data
+from labs.algorithms.linear_mpc_condensed import SOLVED, Condensed, CondensedData
 from labs.algorithms.linear_mpc_limits import KINDS, sets, tolerance
 from labs.problems.linear_mpc import LinearMpcProblem
 
@@ -52,7 +52,7 @@ class Infeasibility:
 
 
 def first_infeasibility(
-    problem: LinearMpcProblem, form: Condensed, data: Data, x: np.ndarray
+    problem: LinearMpcProblem, form: Condensed, data: CondensedData, x: np.ndarray
 ) -> Infeasibility | None:
     """By bisection over the step, each time with the limits up to it alone; None where all can
     be met."""

@@ -67,7 +67,7 @@ class TwoSided(NamedTuple):
         return np.where(apart[..., self.above], 1, np.where(lower, -1, 0))
 
 
-class Terms(NamedTuple):
+class ProblemTerms(NamedTuple):
     """What of a problem over its last N steps may change while its matrices stay."""
 
     N: int
@@ -85,7 +85,7 @@ class Terms(NamedTuple):
     """By kind, (steps, rows)."""
 
     @classmethod
-    def of(cls, problem: LinearMpcProblem, N: int) -> "Terms":
+    def of(cls, problem: LinearMpcProblem, N: int) -> "ProblemTerms":
         """Those of the problem's last N steps: the tail that Bellman's principle speaks of."""
         n, m, X, U = problem.n, problem.m, problem.state_set, problem.control_set
         end = problem.terminal_set

@@ -14,7 +14,7 @@ import numpy as np
 import piqp
 from scipy.sparse import block_diag, csc_matrix, eye_array, kron
 
-from labs.algorithms.linear_mpc_limits import KINDS, Terms, TwoSided, sets
+from labs.algorithms.linear_mpc_limits import KINDS, ProblemTerms, TwoSided, sets
 from labs.problems.linear_mpc import LinearMpcProblem
 
 TOLERANCE = 1e-10
@@ -22,7 +22,7 @@ TOLERANCE = 1e-10
 MOST_ITERATIONS = 100
 
 
-class Data(NamedTuple):
+class SparseData(NamedTuple):
     """What the terms of a problem make of the programme: all that changes while its matrices
     stay."""
 
@@ -35,7 +35,7 @@ class Data(NamedTuple):
     upper: np.ndarray
 
 
-class Solution(NamedTuple):
+class SparseSolution(NamedTuple):
     """As the solver left it."""
 
     solved: bool
@@ -88,7 +88,7 @@ class Sparse:
         place = csc_matrix((ones, (np.arange(len(used)), used)), (len(used), size))
         return csc_matrix((here + before) @ place)
 
-    def data(self, terms: Terms) -> Data:
+    def data(self, terms: ProblemTerms) -> SparseData:
         """For these terms."""
         problem = self._problem
         cost = np.full(self.P.shape[0], self.penalty or 0.0)
@@ -107,9 +107,9 @@ class Sparse:
                     lower[at] = -np.inf
                     at = at + len(at)
                 lower[at] = below
-        return Data(cost, -np.tile(terms.c, self.N), lower, upper)
+        return SparseData(cost, -np.tile(terms.c, self.N), lower, upper)
 
-    def solve(self, data: Data, x: np.ndarray) -> Solution:
+    def solve(self, data: SparseData, x: np.ndarray) -> SparseSolution:
         """From x (n,)."""
         b = data.added.copy()
         b[: self.n] -= self._problem.A @ x
@@ -130,7 +130,7 @@ class Sparse:
         found = solver.result
         z = np.asarray(found.x)
         pushes = np.asarray(found.z_u) - np.asarray(found.z_l)
-        return Solution(
+        return SparseSolution(
             solved,
             np.vstack([x, z[self.x_at]]),
             z[self.u_at],

@@ -26,7 +26,7 @@ Model = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
-class Options:
+class MpcOptions:
     """How plans follow each other. Raises LabError for a negative delay or an empty horizon."""
 
     warm: bool = True
@@ -75,7 +75,7 @@ class RecedingHorizon:
     """and the same with when that was and what acts instead."""
 
 
-def init(options: Options, rest: np.ndarray) -> RecedingHorizon:
+def init(options: MpcOptions, rest: np.ndarray) -> RecedingHorizon:
     """Before the first period; `rest` (nu,) acts until the first plan does."""
     return RecedingHorizon(0, rest, np.tile(rest, (options.delay, 1)))
 
@@ -83,7 +83,7 @@ def init(options: Options, rest: np.ndarray) -> RecedingHorizon:
 def step(
     planner: Planner,
     model: Model,
-    options: Options,
+    options: MpcOptions,
     at: RecedingHorizon,
     x: np.ndarray,
     brake: np.ndarray,
@@ -129,13 +129,13 @@ def control(plan: Plan, age: int, x: np.ndarray) -> np.ndarray:
     return np.asarray(plan.U[age] + plan.K @ (x - plan.X[age]))
 
 
-def horizon(options: Options, period: int) -> int | None:
+def horizon(options: MpcOptions, period: int) -> int | None:
     """N of the plan at this period; None is the planner's own."""
     first = options.shrink_from
     return None if first is None else first - period % first
 
 
-def shift(plan: Plan, steps: int, model: Model, options: Options) -> Plan | None:
+def shift(plan: Plan, steps: int, model: Model, options: MpcOptions) -> Plan | None:
     """The plan `steps` periods later: a guess, found by nobody and without a cost; None after the
     plan's end. Its last controls are zero or repeated, and its last states follow from the model;
     a horizon that shrinks loses them instead."""

@@ -21,13 +21,19 @@ from typing import NamedTuple, final
 import numpy as np
 from scipy.sparse import csc_array
 
-from labs.algorithms.assembly import Assembly, Terms
+from labs.algorithms.assembly import Assembly, MatrixTerms
 from labs.algorithms.multiple_shooting_segments import Segments, congruent_sums, own_terms
-from labs.algorithms.shooting_steps import CostForm, Linearization, Steps, advance, method_of
+from labs.algorithms.shooting_steps import (
+    CostForm,
+    ShootingSteps,
+    StepDerivatives,
+    advance,
+    method_of,
+)
 from labs.algorithms.state_constraints import StateConstraints
 from labs.errors import LabError
 from labs.problems.continuous_control import ContinuousProblem
-from labs.problems.nonlinear_program import Derivatives, Values
+from labs.problems.nonlinear_program import ProgramDerivatives, ProgramValues
 from labs.problems.optimal_control import LARGEST_STATE
 from labs.resumable import Resumable
 
@@ -47,10 +53,10 @@ class Arcs(NamedTuple):
     diverged: bool
 
 
-class Sensitivities(NamedTuple):
+class SegmentSensitivities(NamedTuple):
     """By the k variables of the segment that a step is in."""
 
-    at: Linearization
+    at: StepDerivatives
     X_z: np.ndarray
     """(K, nx, k)"""
     Y_z: np.ndarray
@@ -79,7 +85,7 @@ class MultipleShooting:
         self.free_time = problem.T_limits is not None
         self.segments = Segments(N, segments, M, self.nx, self.nu, self.free_time)
         self.n = self.segments.n
-        self.steps = Steps(problem, scheme, N * M, form)
+        self.steps = ShootingSteps(problem, scheme, N * M, form)
         self._constraints = StateConstraints(problem)
         T = problem.T_limits or (0.0, 0.0)
         X_lower, X_upper = (
@@ -94,7 +100,7 @@ class MultipleShooting:
         self._asked[self.segments.pieces[1:-1] - 1, :bounds] = False
         self._c_z, self._g_z, self._l_zz = self._patterns()
         self._arcs: Arcs | None = None
-        self._sensitivities: tuple[np.ndarray, Sensitivities] | None = None
+        self._sensitivities: tuple[np.ndarray, SegmentSensitivities] | None = None
 
     # Variables --------------------------------------------------------------------------------
 
@@ -150,7 +156,7 @@ class MultipleShooting:
         ends = self.arcs(z).Y[self.segments.first_steps[1:] - 1]
         return np.asarray(z[self.segments.starts[1:]] - ends)
 
-    def sensitivities(self, z: np.ndarray) -> Sensitivities:
+    def sensitivities(self, z: np.ndarray) -> SegmentSensitivities:
         """Of all arcs, by the recursion of single shooting in each segment: first dx/ds_i = I,
         dx/dy = 0. The last ones are kept."""
         if self._sensitivities is not None and np.array_equal(self._sensitivities[0], z):
@@ -164,13 +170,13 @@ class MultipleShooting:
             rows = cut.first_steps[:running] + j
             X_z[rows] = x_z = x_z[:running]
             Y_z[rows] = x_z = at.A[rows] @ x_z + through_w[rows]
-        found = Sensitivities(at, X_z, Y_z)
+        found = SegmentSensitivities(at, X_z, Y_z)
         self._sensitivities = z.copy(), found
         return found
 
     # As a nonlinear programme -----------------------------------------------------------------
 
-    def values(self, z: np.ndarray) -> Values:
+    def values(self, z: np.ndarray) -> ProgramValues:
         """At z (n,)."""
         arcs, constraints = self.arcs(z), self._constraints
         ends, first = arcs.Y[self.M - 1 :: self.M], z[self.segments.starts[0]]
@@ -180,9 +186,9 @@ class MultipleShooting:
             c = np.concatenate([first - self.problem.x0, gaps, end])
             g = constraints.values(ends)[self._asked]
         sound = not arcs.diverged and np.isfinite(f)
-        return Values(f if sound else np.inf, c, g)
+        return ProgramValues(f if sound else np.inf, c, g)
 
-    def derivatives(self, z: np.ndarray) -> Derivatives:
+    def derivatives(self, z: np.ndarray) -> ProgramDerivatives:
         """At z (n,)."""
         cut, constraints = self.segments, self._constraints
         at, X_z, Y_z = self.sensitivities(z)
@@ -193,7 +199,7 @@ class MultipleShooting:
         end = constraints.end_jacobian(ends[-1]) @ Y_z[-1]
         c_z = self._c_z.matrix(np.concatenate([np.ones(1), joints.ravel(), end.ravel()]))
         g_z = constraints.jacobians(ends) @ Y_z[self.M - 1 :: self.M]
-        return Derivatives(cut.sum_by_variable(by_step), c_z, self._g_z.matrix(g_z.ravel()))
+        return ProgramDerivatives(cut.sum_by_variable(by_step), c_z, self._g_z.matrix(g_z.ravel()))
 
     def hessian(
         self, z: np.ndarray, lam: np.ndarray, mu: np.ndarray, exact: bool
@@ -260,7 +266,7 @@ class MultipleShooting:
         c_z = Assembly(
             (size + ends, self.n),
             1 + joints + ends * k,
-            Terms(rows.ravel(), cut.starts.ravel(), none, np.ones(size)),
+            MatrixTerms(rows.ravel(), cut.starts.ravel(), none, np.ones(size)),
             own_terms(rows[1:], cut.columns[:-1], 1, -1.0),
             own_terms(size + np.arange(ends)[None], cut.columns[-1:], 1 + joints),
         )
@@ -277,7 +283,7 @@ class MultipleShooting:
         return found
 
     def _costates(
-        self, arcs: Arcs, at: Linearization, final_x: np.ndarray, lam: np.ndarray, mu: np.ndarray
+        self, arcs: Arcs, at: StepDerivatives, final_x: np.ndarray, lam: np.ndarray, mu: np.ndarray
     ) -> np.ndarray:
         """p (K, nx) after each step, of the Lagrangian: at the end of a segment -lam of its gap,
         and what constraints push."""

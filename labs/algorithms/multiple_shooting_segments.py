@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from labs.algorithms.assembly import Terms, block_terms
+from labs.algorithms.assembly import MatrixTerms, block_terms
 
 
 class Segments:
@@ -62,11 +62,13 @@ class Segments:
         return np.bincount(self.columns[own], of_segment[own], minlength=self.n)
 
 
-def own_terms(rows: np.ndarray, columns: np.ndarray, first: int, coefficient: float = 1.0) -> Terms:
+def own_terms(
+    rows: np.ndarray, columns: np.ndarray, first: int, coefficient: float = 1.0
+) -> MatrixTerms:
     """`block_terms` without those of variables -1."""
     terms = block_terms(rows, columns, first, coefficient)
     own = (terms.row >= 0) & (terms.column >= 0)
-    return Terms(*(part[own] for part in terms))
+    return MatrixTerms(*(part[own] for part in terms))
 
 
 def congruent_sums(Z: np.ndarray, H: np.ndarray, cuts: np.ndarray) -> np.ndarray:

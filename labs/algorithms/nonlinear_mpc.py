@@ -22,7 +22,7 @@ from typing import Self, final
 import numpy as np
 
 from labs.algorithms.nonlinear_mpc_problem import NonlinearMpcProblem
-from labs.algorithms.stage_qp import Linearization, StageQp, Step
+from labs.algorithms.stage_qp import Linearization, StageQp, StageStep
 from labs.errors import LabError
 from labs.problems.receding_horizon import Plan
 from labs.resumable import Resumable, timed
@@ -73,7 +73,7 @@ class NonlinearMpc:
     def _plan(
         self, x: np.ndarray, guess: Plan | None, N: int, seconds: dict[str, float]
     ) -> Resumable[Plan]:
-        qp, step = self._qp(N), Step(*self._first(x, guess, N), np.zeros(N))
+        qp, step = self._qp(N), StageStep(*self._first(x, guess, N), np.zeros(N))
         qp.aim(self.problem)
         most, iteration, change, gap = self.iterations or MOST_ITERATIONS, 0, np.inf, np.inf
         while iteration < most and change > TOLERANCE:
@@ -161,7 +161,7 @@ class NonlinearMpc:
                 message = self._infeasible(least)
         return Plan(at.X, at.U, np.nan, False, message, iterations=iteration)
 
-    def _infeasible(self, least: Step) -> str:
+    def _infeasible(self, least: StageStep) -> str:
         """What is exceeded, and when, by the trajectory that exceeds limits least."""
         p, n = self.problem, self.problem.nx // 2
         X = least.X[1:]

@@ -25,7 +25,7 @@ class Replay(NamedTuple):
     """(1,) int64: how many were ever stored."""
 
 
-class Transitions(NamedTuple):
+class Minibatch(NamedTuple):
     """Some of them, named as in `Replay`."""
 
     observations: np.ndarray
@@ -49,7 +49,7 @@ def empty(capacity: int, observation_size: int) -> Replay:
 
 
 @compiled
-def store(replay: Replay, new: Transitions) -> None:
+def store(replay: Replay, new: Minibatch) -> None:
     """Adds transitions."""
     capacity = len(replay.costs)
     for i in range(len(new.costs)):

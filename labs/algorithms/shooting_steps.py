@@ -78,7 +78,7 @@ def advance(
     return moved
 
 
-class Linearization(NamedTuple):
+class StepDerivatives(NamedTuple):
     """First derivatives of K steps, and the Hessian of L by Gauss-Newton if it was asked for."""
 
     A: np.ndarray
@@ -94,7 +94,7 @@ class Linearization(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Steps:
+class ShootingSteps:
     """K steps of one method through the horizon of a problem."""
 
     problem: ContinuousProblem
@@ -118,7 +118,7 @@ class Steps:
         running = self.problem.cost.running
         return float(sum(b * (h @ running(P[:, i], U)) for i, b in self._nodes))
 
-    def linearize(self, X: np.ndarray, W: np.ndarray, gauss_newton: bool) -> Linearization:
+    def linearize(self, X: np.ndarray, W: np.ndarray, gauss_newton: bool) -> StepDerivatives:
         """At the first K points of X, or of any K points."""
         h, method = 1.0 / self.K, self.method
         X = X[: len(W)]
@@ -136,7 +136,7 @@ class Steps:
                 P = X + shift * k[i - 1][0]
                 P_z += shift * np.concatenate(k[i - 1][1:], axis=2)
             self._add_running(P, P_z, W, h * b, L_z, L_zz)
-        return Linearization(A, B, L_z[:, :nx], L_z[:, nx:], L_zz)
+        return StepDerivatives(A, B, L_z[:, :nx], L_z[:, nx:], L_zz)
 
     def hamiltonian_hessian(
         self, X: np.ndarray, W: np.ndarray, p: np.ndarray

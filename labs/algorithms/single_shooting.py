@@ -27,10 +27,10 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from labs.algorithms.adjoint import adjoint_gradient
-from labs.algorithms.shooting_steps import CostForm, Linearization, Steps, method_of
+from labs.algorithms.shooting_steps import CostForm, ShootingSteps, StepDerivatives, method_of
 from labs.algorithms.state_constraints import StateConstraints
 from labs.problems.continuous_control import ContinuousProblem
-from labs.problems.nonlinear_program import Derivatives, Values
+from labs.problems.nonlinear_program import ProgramDerivatives, ProgramValues
 from labs.problems.optimal_control import LARGEST_STATE, diverges_at
 from labs.resumable import Resumable
 
@@ -69,7 +69,7 @@ class SingleShooting:
         self.nx, self.nu = problem.dynamics.nx, problem.dynamics.nu
         self.free_time = problem.T_limits is not None
         self.n = N * self.nu + self.free_time
-        self.steps = Steps(problem, scheme, N * M, form)
+        self.steps = ShootingSteps(problem, scheme, N * M, form)
         self._constraints = StateConstraints(problem)
         self._rollout: Rollout | None = None
 
@@ -121,7 +121,7 @@ class SingleShooting:
         j = diverges_at(self.rollout(y).X)
         return j, float(self.times(y)[j])
 
-    def sensitivities(self, at: Linearization) -> np.ndarray:
+    def sensitivities(self, at: StepDerivatives) -> np.ndarray:
         """dx_j/dy (N M + 1, nx, n), by the recursion of the notes."""
         nu, S = self.nu, np.zeros((self.N * self.M + 1, self.nx, self.n))
         for j, (A, B) in enumerate(zip(at.A, at.B, strict=True)):
@@ -137,7 +137,7 @@ class SingleShooting:
         """(number of equalities, n): the derivative of what has to be zero at the end."""
         return np.asarray(self._constraints.end_jacobian(self.rollout(y).X[-1]) @ S[-1])
 
-    def linearize(self, y: np.ndarray, gauss_newton: bool = False) -> Linearization:
+    def linearize(self, y: np.ndarray, gauss_newton: bool = False) -> StepDerivatives:
         """First derivatives of all steps along the rollout of y."""
         at = self.rollout(y)
         return self.steps.linearize(at.X, at.W, gauss_newton)
@@ -154,14 +154,14 @@ class SingleShooting:
         return float(J) if np.isfinite(J) else np.inf
 
     def gradient_by_sensitivities(
-        self, y: np.ndarray, at: Linearization, S: np.ndarray
+        self, y: np.ndarray, at: StepDerivatives, S: np.ndarray
     ) -> np.ndarray:
         """dJ/dy (n,), from dx/dy."""
         final, _ = self.problem.cost.final_derivatives(self.rollout(y).X[-1], exact=False)
         through_x = np.tensordot(at.L_x, S[:-1], axes=2) + final @ S[-1]
         return np.asarray(through_x + self._to_variables(at.L_w))
 
-    def gradient_by_adjoint(self, y: np.ndarray, at: Linearization) -> np.ndarray:
+    def gradient_by_adjoint(self, y: np.ndarray, at: StepDerivatives) -> np.ndarray:
         """dJ/dy (n,), from one sweep backward."""
         final, _ = self.problem.cost.final_derivatives(self.rollout(y).X[-1], exact=False)
         l_x = np.concatenate([at.L_x, final[None]])
@@ -183,23 +183,23 @@ class SingleShooting:
 
     # As a nonlinear programme -----------------------------------------------------------------
 
-    def values(self, y: np.ndarray) -> Values:
+    def values(self, y: np.ndarray) -> ProgramValues:
         X, constraints = self.rollout(y).X, self._constraints
         with np.errstate(all="ignore"):
             g = constraints.values(X[self.M :: self.M])
-            return Values(self.cost(y), constraints.end_values(X[-1]), g.ravel())
+            return ProgramValues(self.cost(y), constraints.end_values(X[-1]), g.ravel())
 
-    def derivatives(self, y: np.ndarray) -> Derivatives:
+    def derivatives(self, y: np.ndarray) -> ProgramDerivatives:
         """The gradient by the adjoint; the constraints' Jacobians by the sensitivities."""
         at, constraints = self.linearize(y), self._constraints
         f_y = self.gradient_by_adjoint(y, at)
         if not constraints.end_names and not constraints.size:
             none = csc_array((0, self.n))
-            return Derivatives(f_y, none, none)
+            return ProgramDerivatives(f_y, none, none)
         S, X = self.sensitivities(at)[self.M :: self.M], self.rollout(y).X[self.M :: self.M]
         g_y = (constraints.jacobians(X) @ S).reshape(-1, self.n)
         c_y = self.end_sensitivities(y, S)
-        return Derivatives(f_y, full_csc(c_y), csc_with(self._g_pattern, g_y))
+        return ProgramDerivatives(f_y, full_csc(c_y), csc_with(self._g_pattern, g_y))
 
     def hessian(
         self, y: np.ndarray, lam: np.ndarray, mu: np.ndarray, exact: bool
@@ -218,7 +218,7 @@ class SingleShooting:
         hessian = np.tensordot(S_i, bent @ S_i, axes=([0, 1], [0, 1]))
         return full_csc(self._assemble(S, H, final) + 0.5 * (hessian + hessian.T))
 
-    def gauss_newton_hessian(self, y: np.ndarray, at: Linearization, S: np.ndarray) -> np.ndarray:
+    def gauss_newton_hessian(self, y: np.ndarray, at: StepDerivatives, S: np.ndarray) -> np.ndarray:
         """(n, n) of J, from a linearisation with L_zz."""
         _, final = self.problem.cost.final_derivatives(self.rollout(y).X[-1], exact=False)
         return self._assemble(S, at.L_zz, final)
@@ -268,7 +268,7 @@ class SingleShooting:
     def _costates(
         self,
         X: np.ndarray,
-        at: Linearization,
+        at: StepDerivatives,
         final: np.ndarray,
         lam: np.ndarray,
         mu: np.ndarray,

@@ -23,8 +23,8 @@ import numpy as np
 
 from labs.algorithms import sqp_active_set, sqp_bfgs
 from labs.algorithms.sqp_filter import LARGEST_GROWTH, Filter, violation
-from labs.algorithms.sqp_iterate import Iterate as Iterate
-from labs.algorithms.sqp_iterate import Options as Options
+from labs.algorithms.sqp_iterate import SqpIterate as SqpIterate
+from labs.algorithms.sqp_iterate import SqpOptions as SqpOptions
 from labs.algorithms.sqp_iterate import Variables as Variables
 from labs.algorithms.sqp_optimality import optimality, worst_violation
 from labs.algorithms.sqp_step import moved
@@ -36,7 +36,7 @@ STALLED = 1e-13
 """A whole step that changes y by less than this, in its units or parts of it, is none."""
 
 
-def init(program: NonlinearProgram, y: np.ndarray, options: Options) -> Iterate:
+def init(program: NonlinearProgram, y: np.ndarray, options: SqpOptions) -> SqpIterate:
     """The first guess y (n,), cut to the bounds. Raises LabError if it does not fit."""
     n = len(program.lower)
     if y.shape != (n,):
@@ -53,15 +53,19 @@ def init(program: NonlinearProgram, y: np.ndarray, options: Options) -> Iterate:
     largest = LARGEST_GROWTH * max(1.0, violation(values))
     multipliers = (np.zeros(len(values.c)), np.zeros(len(values.g)), np.zeros(n))
     infeasible = bool(empty.size)
-    return Iterate(y, values, *multipliers, Filter(largest), stopped=stopped, infeasible=infeasible)
+    return SqpIterate(
+        y, values, *multipliers, Filter(largest), stopped=stopped, infeasible=infeasible
+    )
 
 
-def step(program: NonlinearProgram, options: Options, at: Iterate) -> Iterate:
+def step(program: NonlinearProgram, options: SqpOptions, at: SqpIterate) -> SqpIterate:
     """One iteration. What has stopped stays as it is."""
     return run_to_completion(step_in_pieces(program, options, at))
 
 
-def step_in_pieces(program: NonlinearProgram, options: Options, at: Iterate) -> Resumable[Iterate]:
+def step_in_pieces(
+    program: NonlinearProgram, options: SqpOptions, at: SqpIterate
+) -> Resumable[SqpIterate]:
     """The same, pausing between pieces of some milliseconds."""
     if at.stopped:
         return at
@@ -83,16 +87,20 @@ def step_in_pieces(program: NonlinearProgram, options: Options, at: Iterate) -> 
     return replace(at, seconds=seconds)
 
 
-def solve(program: NonlinearProgram, y: np.ndarray, options: Options | None = None) -> Iterate:
+def solve(
+    program: NonlinearProgram, y: np.ndarray, options: SqpOptions | None = None
+) -> SqpIterate:
     """Iterates from the first guess y (n,) until it stops."""
-    options = options or Options()
+    options = options or SqpOptions()
     at = init(program, y, options)
     while not at.stopped:
         at = step(program, options, at)
     return at
 
 
-def restart(program: NonlinearProgram, last: Variables | Iterate, options: Options) -> Iterate:
+def restart(
+    program: NonlinearProgram, last: Variables | SqpIterate, options: SqpOptions
+) -> SqpIterate:
     """From where another programme's iterate ended, with its multipliers where they fit: for a
     problem that is a little different."""
     new = init(program, last.y, options)
@@ -106,7 +114,9 @@ def prepare() -> None:
     sqp_active_set.prepare()
 
 
-def _expanded(program: NonlinearProgram, options: Options, at: Iterate) -> Resumable[Iterate]:
+def _expanded(
+    program: NonlinearProgram, options: SqpOptions, at: SqpIterate
+) -> Resumable[SqpIterate]:
     """With derivatives at y, the first Hessian that BFGS learns from, and whether it has
     converged there."""
     d = program.derivatives(at.y)
@@ -125,8 +135,8 @@ def _expanded(program: NonlinearProgram, options: Options, at: Iterate) -> Resum
 
 
 def _stopped_short(
-    program: NonlinearProgram, options: Options, before: Iterate, at: Iterate
-) -> Iterate:
+    program: NonlinearProgram, options: SqpOptions, before: SqpIterate, at: SqpIterate
+) -> SqpIterate:
     """Stopped here without convergence, if there is a reason."""
     assert at.optimality
     change = float((np.abs(at.y - before.y) / (1.0 + np.abs(at.y))).max(initial=0.0))
@@ -143,7 +153,7 @@ def _stopped_short(
     return replace(at, stopped=stopped, out_of_iterations=True)
 
 
-def _convergence_message(at: Iterate) -> str:
+def _convergence_message(at: SqpIterate) -> str:
     assert at.optimality
     return (
         f"Converged after {at.iteration} iteration{'s'[: at.iteration != 1]}: KKT residual "

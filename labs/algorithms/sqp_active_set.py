@@ -21,7 +21,7 @@ import numpy as np
 from scipy.linalg.lapack import dgbtrf, dgbtrs
 from scipy.sparse import csc_array, vstack
 
-from labs.algorithms.sqp_qp_solver import NARROW, QuadraticProgram, Solution
+from labs.algorithms.sqp_qp_solver import NARROW, QpSolution, QuadraticProgram
 from labs.compiled import compiled
 
 ROUNDS, MANY = 4, 30
@@ -43,7 +43,7 @@ class ActiveSet(NamedTuple):
         return sum(int(np.sum(mine != theirs)) for mine, theirs in zip(self, other, strict=True))
 
 
-def active_set(qp: QuadraticProgram, found: Solution) -> ActiveSet:
+def active_set(qp: QuadraticProgram, found: QpSolution) -> ActiveSet:
     """Of an interior point's solution: where a multiplier is larger than the gap it belongs to."""
     assert found.x is not None
     gap = np.where(found.z_bounds > 0.0, qp.upper - found.x, found.x - qp.lower)
@@ -51,7 +51,7 @@ def active_set(qp: QuadraticProgram, found: Solution) -> ActiveSet:
     return ActiveSet(np.sign(found.z_bounds) * at_bound, found.z > qp.h - qp.G @ found.x)
 
 
-def solve_active(qp: QuadraticProgram, guess: ActiveSet, tolerance: float) -> Solution | None:
+def solve_active(qp: QuadraticProgram, guess: ActiveSet, tolerance: float) -> QpSolution | None:
     """From a guess of what is active; None where that does not lead to a solution in a few rounds,
     or the programme has no band. `tolerance` is absolute, of all conditions."""
     active = ActiveSet(np.where(qp.lower == qp.upper, 1.0, guess.bounds), guess.inequalities)
@@ -78,7 +78,7 @@ def prepare() -> None:
     solve_active(qp, free, 1e-9)
 
 
-def _held(qp: QuadraticProgram, active: ActiveSet, tolerance: float) -> Solution | None:
+def _held(qp: QuadraticProgram, active: ActiveSet, tolerance: float) -> QpSolution | None:
     """The solution with this held, or None."""
     m, some = len(qp.b), active.inequalities.any()
     B = csc_array(vstack([qp.A, qp.G[active.inequalities]], format="csc")) if some else qp.A
@@ -103,7 +103,7 @@ def _held(qp: QuadraticProgram, active: ActiveSet, tolerance: float) -> Solution
             z, z_bounds = np.zeros(len(qp.h)), np.zeros(len(x))
             z[active.inequalities] = y[m:]
             z_bounds[~free] = pull[~free]
-            return Solution(x, False, y[:m], z, z_bounds)
+            return QpSolution(x, False, y[:m], z, z_bounds)
         step, _ = dgbtrs(factors, width, width, step, pivots)
         x[free] += step[places]
         y += step[rows]
@@ -111,7 +111,7 @@ def _held(qp: QuadraticProgram, active: ActiveSet, tolerance: float) -> Solution
 
 
 def _revised(
-    qp: QuadraticProgram, active: ActiveSet, found: Solution, tolerance: float
+    qp: QuadraticProgram, active: ActiveSet, found: QpSolution, tolerance: float
 ) -> ActiveSet:
     """Without what is pushed away from, with what is crossed."""
     assert found.x is not None

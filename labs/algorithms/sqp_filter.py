@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labs.problems.nonlinear_program import NonlinearProgram, Values
+from labs.problems.nonlinear_program import NonlinearProgram, ProgramValues
 from labs.resumable import Resumable
 
 HALVINGS = 20
@@ -34,7 +34,7 @@ ROUNDING = 1e-14
 """Changes of f below this part of its size cannot be told from rounding."""
 
 
-def violation(values: Values) -> float:
+def violation(values: ProgramValues) -> float:
     """theta, in the units of c and g."""
     return float(np.abs(values.c).sum() + np.maximum(values.g, 0.0).sum())
 
@@ -63,7 +63,7 @@ class Trial(NamedTuple):
     """The point that a search accepted."""
 
     y: np.ndarray
-    values: Values
+    values: ProgramValues
     alpha: float
     filter: Filter
     corrected: bool = False
@@ -81,11 +81,11 @@ class Search(NamedTuple):
 def search(
     program: NonlinearProgram,
     y: np.ndarray,
-    values: Values,
+    values: ProgramValues,
     p: np.ndarray,
     slope: float,
     filter_: Filter,
-    corrected: Callable[[np.ndarray, Values], np.ndarray | None],
+    corrected: Callable[[np.ndarray, ProgramValues], np.ndarray | None],
 ) -> Resumable[Search]:
     """Along p from y, f falling by `slope`. `corrected` makes of a step and of the values at its
     end the corrected step, or None."""
@@ -94,7 +94,7 @@ def search(
     small = 1e-4 * max(1.0, filter_.largest / LARGEST_GROWTH)
     valued = False
 
-    def judged(y_new: np.ndarray, new: Values, alpha: float, again: bool) -> Trial | None:
+    def judged(y_new: np.ndarray, new: ProgramValues, alpha: float, again: bool) -> Trial | None:
         theta_new = violation(new)
         if not filter_.allows(theta_new, new.f, rounding):
             return None

@@ -11,7 +11,7 @@ from labs.algorithms.sqp_filter import Filter
 from labs.algorithms.sqp_optimality import Optimality
 from labs.algorithms.sqp_qp_solver import QpSolver
 from labs.errors import LabError
-from labs.problems.nonlinear_program import Derivatives, Values
+from labs.problems.nonlinear_program import ProgramDerivatives, ProgramValues
 
 HESSIANS: Mapping[str, str] = {
     "gauss-newton": "Gauss-Newton",
@@ -21,7 +21,7 @@ HESSIANS: Mapping[str, str] = {
 
 
 @dataclass(frozen=True)
-class Options:
+class SqpOptions:
     """How the iterations go. Raises LabError."""
 
     hessian: str = "exact"
@@ -53,12 +53,12 @@ class Variables:
 
 
 @dataclass(frozen=True, eq=False)
-class Iterate:
+class SqpIterate:
     """Where the solver is. Arrays are never written into again."""
 
     y: np.ndarray
     """(n,)"""
-    values: Values
+    values: ProgramValues
     """f, c and g there."""
     lam: np.ndarray
     """Multipliers of c."""
@@ -93,7 +93,7 @@ class Iterate:
     """Whether it stopped because there were no more of them."""
     seconds: Mapping[str, float] = field(default_factory=dict)
     """Of the wall clock, spent by the last iteration in derivatives, QP and line search."""
-    derivatives: Derivatives | None = None
+    derivatives: ProgramDerivatives | None = None
     """At y."""
     learnt: Learnt | None = None
     """BFGS's Hessian."""
@@ -129,7 +129,7 @@ class Iterate:
         """(number of inequalities,) whether each is pushed against."""
         return np.asarray(self.mu > np.maximum(-self.values.g, 0.0))
 
-    def gradient(self, d: Derivatives) -> np.ndarray:
+    def gradient(self, d: ProgramDerivatives) -> np.ndarray:
         """(n,) of the Lagrangian but for its bounds, by these derivatives and the multipliers
         here."""
         return np.asarray(d.f_y + d.c_y.T @ self.lam + d.g_y.T @ self.mu)

@@ -14,19 +14,19 @@ from labs.algorithms.sqp_filter import (
     Trial,
     violation,
 )
-from labs.problems.nonlinear_program import NonlinearProgram, Values
+from labs.problems.nonlinear_program import NonlinearProgram, ProgramValues
 from labs.resumable import Resumable
 
 
 def descend(
     program: NonlinearProgram,
     y: np.ndarray,
-    values: Values,
+    values: ProgramValues,
     p: np.ndarray,
     slope: float,
     gamma: float,
     filter_: Filter,
-    corrected: Callable[[np.ndarray, Values], np.ndarray | None],
+    corrected: Callable[[np.ndarray, ProgramValues], np.ndarray | None],
 ) -> Resumable[Search]:
     """Along p from y, phi falling by `slope`; the filter is forgotten, but for its largest theta.
     `corrected` as in `sqp_filter.search`."""

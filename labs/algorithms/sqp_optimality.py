@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import csc_array
 
-from labs.problems.nonlinear_program import Derivatives, NonlinearProgram, Values
+from labs.problems.nonlinear_program import NonlinearProgram, ProgramDerivatives, ProgramValues
 
 MET = 1e-9
 """A constraint missed by less, in its unit, is not worth a word."""
@@ -29,8 +29,8 @@ class Optimality(NamedTuple):
 def optimality(
     program: NonlinearProgram,
     y: np.ndarray,
-    values: Values,
-    derivatives: Derivatives,
+    values: ProgramValues,
+    derivatives: ProgramDerivatives,
     lam: np.ndarray,
     mu: np.ndarray,
     largest_gradient: float,
@@ -57,7 +57,7 @@ def optimality(
     )
 
 
-def worst_violation(program: NonlinearProgram, values: Values) -> str:
+def worst_violation(program: NonlinearProgram, values: ProgramValues) -> str:
     """The constraint that is missed by most, as a part of a sentence."""
     c, g = np.abs(values.c), values.g
     by_c, by_g = float(c.max(initial=0.0)), float(g.max(initial=0.0))

@@ -39,7 +39,7 @@ class QuadraticProgram(NamedTuple):
     upper: np.ndarray
 
 
-class Solution(NamedTuple):
+class QpSolution(NamedTuple):
     """What the solver found."""
 
     x: np.ndarray | None
@@ -61,7 +61,7 @@ class QpSolver:
     def __init__(self) -> None:
         self._known: list[_Structure] = []
 
-    def solve(self, qp: QuadraticProgram, tolerance: float, stages: bool = True) -> Solution:
+    def solve(self, qp: QuadraticProgram, tolerance: float, stages: bool = True) -> QpSolution:
         """To this tolerance of the residuals, absolute and relative, and GAP of it of the
         duality gap; by stages, if they are wanted and the order of the variables allows it, and if
         that fails in general."""
@@ -104,7 +104,7 @@ class _Structure:
         P, A, G = self._matrices
         return P.fits(qp.P) and A.fits(qp.A) and G.fits(qp.G)
 
-    def solve(self, qp: QuadraticProgram, tolerance: float) -> Solution:
+    def solve(self, qp: QuadraticProgram, tolerance: float) -> QpSolution:
         """One of them."""
         settings = self._solver.settings
         settings.eps_abs = settings.eps_rel = tolerance
@@ -121,7 +121,7 @@ class _Structure:
         status, found = self._solver.solve(), self._solver.result
         x = found.x.copy() if status == piqp.PIQP_SOLVED else None
         infeasible = status == piqp.PIQP_PRIMAL_INFEASIBLE
-        return Solution(x, infeasible, found.y.copy(), found.z_u.copy(), found.z_bu - found.z_bl)
+        return QpSolution(x, infeasible, found.y.copy(), found.z_u.copy(), found.z_bu - found.z_bl)
 
 
 class _Nonzeros:

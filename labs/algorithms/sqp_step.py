@@ -19,19 +19,19 @@ from scipy.sparse import csc_array, diags_array
 
 from labs.algorithms.sqp_convexity import Convex, convexify
 from labs.algorithms.sqp_filter import Trial, search, violation
-from labs.algorithms.sqp_iterate import Iterate, Options
+from labs.algorithms.sqp_iterate import SqpIterate, SqpOptions
 from labs.algorithms.sqp_merit import descend
 from labs.algorithms.sqp_optimality import worst_violation
 from labs.algorithms.sqp_subproblem import (
     TOLERANCE,
-    Answer,
     Subproblem,
+    SubproblemSolution,
     Unsolved,
     least_violation,
     solve_elastic,
     solve_subproblem,
 )
-from labs.problems.nonlinear_program import NonlinearProgram, Values
+from labs.problems.nonlinear_program import NonlinearProgram, ProgramValues
 from labs.resumable import Resumable, timed
 
 SHARES = (1.0, 0.5, 0.0)
@@ -66,8 +66,8 @@ PATIENCE, PROGRESS = 15, 0.05
 
 
 def moved(
-    program: NonlinearProgram, options: Options, at: Iterate, seconds: dict[str, float]
-) -> Resumable[Iterate]:
+    program: NonlinearProgram, options: SqpOptions, at: SqpIterate, seconds: dict[str, float]
+) -> Resumable[SqpIterate]:
     """After one step, or stopped where there is none; adds up its `seconds`."""
     assert at.derivatives
     H, f_yy = yield from timed(_hessians(program, options, at), seconds, "derivatives")
@@ -93,7 +93,7 @@ def moved(
             break
     at = replace(at, delta=convex.delta, theta=convex.theta, loose=False, settled=False)
     most = LARGEST_MULTIPLIER * qp.unit
-    if isinstance(answer, Answer) and _largest(answer) <= most:
+    if isinstance(answer, SubproblemSolution) and _largest(answer) <= most:
         settled = bool(at.active and answer.active.changes(at.active) <= FEW)
         at = replace(at, loose=answer.loose, active=answer.active, settled=settled)
         again, slope = _corrections(options, at, qp, None), float(qp.q @ answer.p)
@@ -109,13 +109,13 @@ def moved(
 
 def _elastic(
     program: NonlinearProgram,
-    options: Options,
-    at: Iterate,
+    options: SqpOptions,
+    at: SqpIterate,
     qp: Subproblem,
     convex: Convex,
     f_yy: csc_array,
     seconds: dict[str, float],
-) -> Resumable[Iterate]:
+) -> Resumable[SqpIterate]:
     """After a step in elastic mode."""
     assert at.optimality
     begun, diverged = perf_counter(), False
@@ -137,7 +137,7 @@ def _elastic(
             # Without second derivatives of the constraints, in steps that stay short.
             damping = max(DAMPING_FACTOR * damping, FIRST_DAMPING)
         begun = perf_counter()
-        answer: Answer | Unsolved = Unsolved(infeasible=False)
+        answer: SubproblemSolution | Unsolved = Unsolved(infeasible=False)
         for _ in range(RAISES + 1):
             answer = solve_elastic(_missing(qp, model, damping * gamma), gamma, at.solver)
             if isinstance(answer, Unsolved) or least is None or gamma >= limit:
@@ -192,7 +192,7 @@ def _damping(damping: float, p: np.ndarray, alpha: float, theta: float) -> float
     return max(DAMPING_FACTOR * damping, 0.1 * needed)
 
 
-def _qp_tolerance(options: Options, at: Iterate) -> float:
+def _qp_tolerance(options: SqpOptions, at: SqpIterate) -> float:
     """How well the QP is to be solved: wholly; but by Gauss-Newton, whose steps are no better than
     their model, far from a solution better than what a step from there can leave, which is the
     square of what the conditions are missed by. The first QP is solved wholly: if the programme is
@@ -204,13 +204,13 @@ def _qp_tolerance(options: Options, at: Iterate) -> float:
     return float(np.clip(0.1 * missed**2, TOLERANCE, LOOSEST))
 
 
-def _largest(of: Answer | Iterate) -> float:
+def _largest(of: SubproblemSolution | SqpIterate) -> float:
     """Of its multipliers."""
     return float(max(np.abs(of.lam).max(initial=0.0), of.mu.max(initial=0.0)))
 
 
 def _hessians(
-    program: NonlinearProgram, options: Options, at: Iterate
+    program: NonlinearProgram, options: SqpOptions, at: SqpIterate
 ) -> Resumable[tuple[csc_array, csc_array]]:
     """The one wanted, or Gauss-Newton's where it is not finite; and Gauss-Newton's."""
     if at.learnt:
@@ -223,7 +223,7 @@ def _hessians(
     return (exact if np.isfinite(exact.data).all() else f_yy), f_yy
 
 
-def _subproblem(program: NonlinearProgram, at: Iterate, P: csc_array, unit: float) -> Subproblem:
+def _subproblem(program: NonlinearProgram, at: SqpIterate, P: csc_array, unit: float) -> Subproblem:
     assert at.derivatives
     f_y, c_y, g_y = at.derivatives
     lower, upper = program.lower - at.y, program.upper - at.y
@@ -234,12 +234,12 @@ def _subproblem(program: NonlinearProgram, at: Iterate, P: csc_array, unit: floa
 
 
 def _corrections(
-    options: Options, at: Iterate, qp: Subproblem, gamma: float | None
-) -> Callable[[np.ndarray, Values], np.ndarray | None]:
+    options: SqpOptions, at: SqpIterate, qp: Subproblem, gamma: float | None
+) -> Callable[[np.ndarray, ProgramValues], np.ndarray | None]:
     """What makes of a step p, and the values at its end, the step that the curvature seen there
     asks for: c(y + p) - c_y p stands for c."""
 
-    def corrected(p: np.ndarray, end: Values) -> np.ndarray | None:
+    def corrected(p: np.ndarray, end: ProgramValues) -> np.ndarray | None:
         if not options.correction:
             return None
         bent = qp._replace(b=qp.A @ p - end.c, h=qp.G @ p - end.g)
@@ -248,12 +248,14 @@ def _corrections(
             if gamma is None
             else solve_elastic(bent, gamma, at.solver)
         )
-        return answer.p if isinstance(answer, Answer) else None
+        return answer.p if isinstance(answer, SubproblemSolution) else None
 
     return corrected
 
 
-def _landed(at: Iterate, qp: Subproblem, convex: Convex, answer: Answer, trial: Trial) -> Iterate:
+def _landed(
+    at: SqpIterate, qp: Subproblem, convex: Convex, answer: SubproblemSolution, trial: Trial
+) -> SqpIterate:
     """At the point that a search accepted, with the QP's multipliers."""
     met = qp.A @ answer.p - (qp.b if at.elastic else 0.0)
     return replace(
@@ -275,7 +277,7 @@ NOT_CONVEX = (
 )
 
 
-def _infeasible_message(program: NonlinearProgram, values: Values, stuck: bool) -> str:
+def _infeasible_message(program: NonlinearProgram, values: ProgramValues, stuck: bool) -> str:
     why = (
         f"{PATIENCE} steps that aimed at it came hardly closer to meeting the constraints"
         if stuck
@@ -288,7 +290,7 @@ def _infeasible_message(program: NonlinearProgram, values: Values, stuck: bool) 
     )
 
 
-def _exhausted_message(program: NonlinearProgram, values: Values, diverged: bool) -> str:
+def _exhausted_message(program: NonlinearProgram, values: ProgramValues, diverged: bool) -> str:
     why = "every rollout along it diverges" if diverged else "no step length is good enough"
     return (
         f"Failed: the line search is exhausted: {why}; {worst_violation(program, values)}. "

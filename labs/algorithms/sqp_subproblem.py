@@ -48,7 +48,7 @@ class Unsolved(NamedTuple):
     """Whether it is sure that there is nothing."""
 
 
-class Answer(NamedTuple):
+class SubproblemSolution(NamedTuple):
     """Multipliers as in `labs.problems.nonlinear_program`."""
 
     p: np.ndarray
@@ -64,13 +64,13 @@ class Answer(NamedTuple):
 
 def solve_subproblem(
     qp: Subproblem, solver: QpSolver, tolerance: float = TOLERANCE, guess: ActiveSet | None = None
-) -> Answer | Unsolved:
+) -> SubproblemSolution | Unsolved:
     """To this tolerance of its residuals, absolute and relative; or wholly, where a guess of what
     is active is nearly right."""
     return _solve(qp, solver, tolerance, guess)
 
 
-def solve_elastic(qp: Subproblem, gamma: float, solver: QpSolver) -> Answer | Unsolved:
+def solve_elastic(qp: Subproblem, gamma: float, solver: QpSolver) -> SubproblemSolution | Unsolved:
     """The same in elastic mode."""
     n, m, k = len(qp.q), len(qp.b), len(qp.h)
     slacks = 2 * m + k
@@ -109,7 +109,7 @@ def _solve(
     tolerance: float,
     guess: ActiveSet | None,
     stages: bool = True,
-) -> Answer | Unsolved:
+) -> SubproblemSolution | Unsolved:
     P = csc_array((qp.P.data / qp.unit, qp.P.indices, qp.P.indptr), shape=qp.P.shape)
     scaled = QuadraticProgram(P, qp.q / qp.unit, qp.A, qp.b, qp.G, qp.h, qp.lower, qp.upper)
     found = solve_active(scaled, guess, TOLERANCE) if guess else None
@@ -121,7 +121,7 @@ def _solve(
     p, lam, mu = _snapped(qp, found.x, nu), qp.unit * found.y, qp.unit * np.maximum(found.z, 0.0)
     if not all(np.isfinite(part).all() for part in (p, lam, mu, nu)):
         return Unsolved(infeasible=False)
-    return Answer(p, lam, mu, nu, active_set(scaled, found), loose)
+    return SubproblemSolution(p, lam, mu, nu, active_set(scaled, found), loose)
 
 
 def _snapped(qp: Subproblem, p: np.ndarray, nu: np.ndarray) -> np.ndarray:

@@ -20,7 +20,7 @@ import numpy as np
 import piqp
 from scipy.sparse import csc_matrix
 
-from labs.algorithms.assembly import Assembly, Terms, block_terms
+from labs.algorithms.assembly import Assembly, MatrixTerms, block_terms
 from labs.algorithms.nonlinear_mpc_problem import NonlinearMpcProblem
 
 MOST_ITERATIONS = 60
@@ -46,7 +46,7 @@ class Linearization(NamedTuple):
     """(N, size, nx)"""
 
 
-class Step(NamedTuple):
+class StageStep(NamedTuple):
     """What solves the programme."""
 
     X: np.ndarray
@@ -85,7 +85,7 @@ class StageQp:
             self.problem = problem
             self._c = self._gradient()
 
-    def solve(self, at: Linearization) -> Step | None:
+    def solve(self, at: Linearization) -> StageStep | None:
         """Of this linearisation; None where nothing is found: it is infeasible."""
         self.write(at)
         return self.run(at.X[0])
@@ -106,7 +106,7 @@ class StageQp:
             beyond = np.matmul(at.g_x, at.X[1:, :, None])[:, :, 0] - at.g
             self._h[-beyond.size :] = beyond.ravel()
 
-    def run(self, x0: np.ndarray) -> Step | None:
+    def run(self, x0: np.ndarray) -> StageStep | None:
         """Solves what was written."""
         if self.call_solver() != piqp.PIQP_SOLVED:
             return None
@@ -114,7 +114,7 @@ class StageQp:
         z = self._solver.result.x
         X = np.concatenate([x0[None], z[self._x]])
         s = z[self._s[:, 0]] if self.problem.soft else np.zeros(self.N)
-        return Step(X, z[self._u] * self._scale, np.maximum(s, 0.0))
+        return StageStep(X, z[self._u] * self._scale, np.maximum(s, 0.0))
 
     def call_solver(self) -> piqp.Status:
         """The solver's own update and solve, nothing else; its first call sets it up."""
@@ -249,9 +249,9 @@ def _scales(problem: NonlinearMpcProblem) -> tuple[np.ndarray, float]:
     return np.where(np.isfinite(width), width, np.sqrt(unit / np.diag(problem.R))), unit
 
 
-def _ones(rows: np.ndarray, columns: np.ndarray, coefficient: float = 1.0) -> Terms:
+def _ones(rows: np.ndarray, columns: np.ndarray, coefficient: float = 1.0) -> MatrixTerms:
     """The coefficient itself: its source is the first, a one."""
-    return Terms(rows, columns, np.zeros(len(rows), int), np.full(len(rows), coefficient))
+    return MatrixTerms(rows, columns, np.zeros(len(rows), int), np.full(len(rows), coefficient))
 
 
 def _solver(tolerance: float) -> piqp.SparseSolver:

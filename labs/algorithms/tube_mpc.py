@@ -27,7 +27,7 @@ import daqp
 import numpy as np
 
 from labs.algorithms.linear_mpc_condensed import EQUALITY, SETTINGS, SOLVED, Condensed
-from labs.algorithms.linear_mpc_limits import Terms
+from labs.algorithms.linear_mpc_limits import ProblemTerms
 from labs.algorithms.polytopes import is_empty
 from labs.algorithms.robust_invariant_set import RobustInvariantSet
 from labs.problems.linear_mpc import LinearMpcProblem
@@ -128,7 +128,7 @@ class _Programme:
     """The quadratic programme in (z_0, v_0, ..., v_(N-1)) over N steps."""
 
     def __init__(self, nominal: LinearMpcProblem, S: Polyhedron, N: int) -> None:
-        self.terms, self.S, self.shape = Terms.of(nominal, N), S, (N, nominal.m)
+        self.terms, self.S, self.shape = ProblemTerms.of(nominal, N), S, (N, nominal.m)
         form = Condensed(nominal, N)
         data = form.data(self.terms)
         slope, self.constant = data.free

@@ -24,7 +24,7 @@ CHAPTERS = (
 
 
 @dataclass(frozen=True)
-class Entry:
+class CatalogEntry:
     """One lab found: where it stands in the course, and the lab itself."""
 
     slug: str
@@ -49,11 +49,11 @@ class Entry:
 
 
 @cache
-def catalog() -> dict[str, Entry]:
+def catalog() -> dict[str, CatalogEntry]:
     """All labs by slug, in the order of the course. Raises LabError for a wrong `ORCLAB_LABS`."""
     extra = [name for name in os.environ.get("ORCLAB_LABS", "").split(",") if name]
     entries = [entry for package in (*CHAPTERS, *extra) for entry in _labs_in(package)]
-    found: dict[str, Entry] = {}
+    found: dict[str, CatalogEntry] = {}
     for entry in entries:
         if entry.slug in found:
             both = f"{found[entry.slug].lab.__class__} and {entry.lab.__class__}"
@@ -62,7 +62,7 @@ def catalog() -> dict[str, Entry]:
     return found
 
 
-def find(slug: str) -> Entry:
+def find(slug: str) -> CatalogEntry:
     """The lab of this name. Raises UnknownLab, which lists those there are."""
     try:
         return catalog()[slug]
@@ -70,7 +70,7 @@ def find(slug: str) -> Entry:
         raise UnknownLab(f"no lab is named {slug!r}; there are {', '.join(catalog())}") from None
 
 
-def _labs_in(package: str) -> list[Entry]:
+def _labs_in(package: str) -> list[CatalogEntry]:
     chapter = _chapter(package)
     folders = [path.parent for root in chapter.__path__ for path in Path(root).glob("*/lab.py")]
     entries = []
@@ -83,7 +83,9 @@ def _labs_in(package: str) -> list[Entry]:
                 and value.__module__ == module.__name__
             ):
                 slug = folder.name.replace("_", "-")
-                entries.append(Entry(slug, chapter.NUMBER, chapter.TITLE, value(), package, folder))
+                entries.append(
+                    CatalogEntry(slug, chapter.NUMBER, chapter.TITLE, value(), package, folder)
+                )
     return sorted(entries, key=lambda entry: (_section_key(entry.lab.section), entry.slug))
 
 

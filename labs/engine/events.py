@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from labs.engine.catalog import Entry
+from labs.engine.catalog import CatalogEntry
 from labs.errors import LabError, ParameterError
 from labs.params import Value
 
@@ -60,7 +60,7 @@ def _event_of(change: Mapping[str, Any]) -> Event:
     return Event(step, kind, name, value)
 
 
-def parse_event(entry: Entry, at: str, what: str) -> Event:
+def parse_event(entry: CatalogEntry, at: str, what: str) -> Event:
     """An event from a command line. Raises ParameterError."""
     try:
         step = round(float(at) / entry.lab.period)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
-from labs.engine.catalog import Entry, find
+from labs.engine.catalog import CatalogEntry, find
 from labs.engine.events import Event
 from labs.engine.run import World
 from labs.engine.solution import Solution
@@ -73,7 +73,7 @@ def _solve(world: World, heard: Callable[[], None]) -> None:
 
 
 def _with_changes(
-    entry: Entry, solution: Solution, changes: Mapping[str, object], seed: int | None
+    entry: CatalogEntry, solution: Solution, changes: Mapping[str, object], seed: int | None
 ) -> Solution:
     """The solution with other parameters: where they are another problem, it is not done."""
     solution.check_lab(entry.slug)

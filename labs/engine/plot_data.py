@@ -40,8 +40,8 @@ from labs.plots import (
 TOLERANCE = 1e-9
 """Of a heat map's axes: an arrow this near to the middle of a cell stands in that cell."""
 
-Data = Mapping[str, Any]
-Table = tuple[Sequence[str], Iterable[Sequence[Any]]]
+_Arrays = Mapping[str, Any]
+_Table = tuple[Sequence[str], Iterable[Sequence[Any]]]
 """A header, and rows of numbers and words."""
 
 
@@ -51,7 +51,7 @@ class PlotData:
 
     about: Mapping[str, Any]
     """Lab, parameters, seed, simulated time, iteration of the solver, versions."""
-    plots: Sequence[tuple[Card, Data]]
+    plots: Sequence[tuple[Card, _Arrays]]
 
     @classmethod
     def of(cls, world: World, titles: Sequence[str] = ()) -> "PlotData":
@@ -118,7 +118,7 @@ def file_name(title: str) -> str:
     return re.sub(r"[^\w]+", "-", title.lower(), flags=re.ASCII).strip("-") or "plot"
 
 
-def _data(plot: Card, channels: Data, known: Data) -> Data:
+def _data(plot: Card, channels: _Arrays, known: _Arrays) -> _Arrays:
     """What a plot names, and nothing else; the world may go on meanwhile."""
     if isinstance(plot, TimeSeries):
         found = {name: channels[name] for name in ("t", *measured(plot)) if name in channels}
@@ -134,11 +134,11 @@ def _data(plot: Card, channels: Data, known: Data) -> Data:
 # Tables -------------------------------------------------------------------------------------
 
 
-def _csv(plot: Card, data: Data) -> bytes:
+def _csv(plot: Card, data: _Arrays) -> bytes:
     return csv_table(*TABLES[type(plot)](plot, data))
 
 
-def _time_series(plot: TimeSeries, data: Data) -> Table:
+def _time_series(plot: TimeSeries, data: _Arrays) -> _Table:
     columns = {"t": data["t"]}
     for name in dict.fromkeys(measured(plot)):
         values = data.get(name, np.empty(0))
@@ -148,14 +148,14 @@ def _time_series(plot: TimeSeries, data: Data) -> Table:
     return list(columns), zip_longest(*columns.values())
 
 
-def _curves(plot: Curves, data: Data) -> Table:
+def _curves(plot: Curves, data: _Arrays) -> _Table:
     noted = any(trace.note for trace in plot.traces)
     x_name, y_name = _fill(plot.x_label, data), _fill(plot.y_label, data)
     header = ("curve", x_name or "x", (y_name if y_name != x_name else "") or "y")
     return (*header, "note") if noted else header, _points(plot, data, noted)
 
 
-def _points(plot: Curves, data: Data, noted: bool) -> Iterable[Sequence[Any]]:
+def _points(plot: Curves, data: _Arrays, noted: bool) -> Iterable[Sequence[Any]]:
     there = (trace for trace in plot.traces if not trace.optional or trace.y in data)
     for trace in there:
         xs, ys = np.asarray(data[trace.x]), np.asarray(data[trace.y])
@@ -170,7 +170,7 @@ def _points(plot: Curves, data: Data, noted: bool) -> Iterable[Sequence[Any]]:
                 yield name, x, y, *note
 
 
-def _heat_map(plot: HeatMap, data: Data) -> Table:
+def _heat_map(plot: HeatMap, data: _Arrays) -> _Table:
     labels = [_fill(text, data) for text in (plot.x_label, plot.y_label, plot.z_label)]
     names = [label or name for label, name in zip(labels, "xyz", strict=True)]
     header = names if len(set(names)) == 3 else ["x", "y", "z"]
@@ -190,7 +190,7 @@ def _heat_map(plot: HeatMap, data: Data) -> Table:
     return [*header, "arrow right", "arrow up"], rows
 
 
-def _matrix(plot: Matrix, data: Data) -> Table:
+def _matrix(plot: Matrix, data: _Arrays) -> _Table:
     values = np.asarray(data[plot.field])
     values = values.reshape(len(values), -1)
     names = data.get(plot.rows) or range(1, len(values) + 1)
@@ -198,7 +198,7 @@ def _matrix(plot: Matrix, data: Data) -> Table:
     return header, ([str(name), *row] for name, row in zip(names, values, strict=True))
 
 
-def _bars(plot: Bars, data: Data) -> Table:
+def _bars(plot: Bars, data: _Arrays) -> _Table:
     columns = {"value": plot.field, "limit": plot.limit, "mark": plot.marks}
     there = {name: np.ravel(data[field]) for name, field in columns.items() if field in data}
     names = data.get(plot.names) or range(1, len(there["value"]) + 1)
@@ -206,11 +206,11 @@ def _bars(plot: Bars, data: Data) -> Table:
     return ["bar", *there], zip_longest(numbered, *there.values())
 
 
-def _note(plot: Note, data: Data) -> Table:
+def _note(plot: Note, data: _Arrays) -> _Table:
     return ["text"], ([line] for line in data[plot.note].split("\n"))
 
 
-TABLES: Mapping[type, Callable[[Any, Data], Table]] = {
+TABLES: Mapping[type, Callable[[Any, _Arrays], _Table]] = {
     TimeSeries: _time_series,
     Curves: _curves,
     HeatMap: _heat_map,
@@ -220,7 +220,7 @@ TABLES: Mapping[type, Callable[[Any, Data], Table]] = {
 }
 
 
-def _fill(text: str, data: Data, k: int | None = None) -> str:
+def _fill(text: str, data: _Arrays, k: int | None = None) -> str:
     """A label with its words, as the page has it (static/js/plots/labels.js)."""
 
     def word(match: re.Match[str]) -> str:

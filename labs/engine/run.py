@@ -11,7 +11,7 @@ from itertools import islice
 
 import numpy as np
 
-from labs.engine.catalog import Entry
+from labs.engine.catalog import CatalogEntry
 from labs.engine.events import Event, Point, format_event, format_value
 from labs.engine.record import LIVE_ROWS, Recorder, Recording, versions
 from labs.engine.snapshots import Snapshots
@@ -33,7 +33,7 @@ class World:
 
     def __init__(
         self,
-        entry: Entry,
+        entry: CatalogEntry,
         changes: Mapping[str, object] | None = None,
         seed: int = 0,
         capacity: int = LIVE_ROWS,

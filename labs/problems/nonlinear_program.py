@@ -15,7 +15,7 @@ from scipy.sparse import csc_array
 from labs.resumable import Resumable
 
 
-class Values(NamedTuple):
+class ProgramValues(NamedTuple):
     """At a point; f is infinite where the programme has no value, as of a diverged rollout."""
 
     f: float
@@ -25,7 +25,7 @@ class Values(NamedTuple):
     """(number of inequalities,)"""
 
 
-class Derivatives(NamedTuple):
+class ProgramDerivatives(NamedTuple):
     """First ones, at a point. The pattern of a Jacobian is the same everywhere."""
 
     f_y: np.ndarray
@@ -52,11 +52,11 @@ class NonlinearProgram(Protocol):
         """Whether the last variable is a final time, which stretches all that happens."""
         ...
 
-    def values(self, y: np.ndarray) -> Values:
+    def values(self, y: np.ndarray) -> ProgramValues:
         """At y (n,)."""
         ...
 
-    def derivatives(self, y: np.ndarray) -> Derivatives:
+    def derivatives(self, y: np.ndarray) -> ProgramDerivatives:
         """At y (n,)."""
         ...
 

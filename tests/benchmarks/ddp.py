@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from labs.algorithms import ddp
-from labs.algorithms.ddp import Iterate, Options
+from labs.algorithms.ddp import DdpIterate, DdpOptions
 from labs.models.discrete import Discrete
 from labs.models.mechanisms import Mechanism, mechanism
 from labs.models.plant import Plant
@@ -50,9 +50,9 @@ def chain(joints: int) -> Mechanism:
     return Mechanism("chain", Plant(like, model, model.createData()), tuple(range(joints)), 0.0)
 
 
-def iteration(problem: OptimalControlProblem, U: np.ndarray) -> tuple[dict[str, float], Iterate]:
+def iteration(problem: OptimalControlProblem, U: np.ndarray) -> tuple[dict[str, float], DdpIterate]:
     """Seconds of each phase, the least of many times the same first iteration, a full step."""
-    options = Options()
+    options = DdpOptions()
     at = ddp.init(problem, U, options)
     found = [ddp.step(problem, options, at) for _ in range(ROUNDS)]
     assert found[0].alpha == 1.0
@@ -69,7 +69,7 @@ def iteration_ratio() -> None:
     for phase, spent in phases.items():
         print(f"{phase:37} {spent * 1e3:7.2f} ms {spent / calls:7.2f}")
     print(f"one iteration                         {total * 1e3:7.2f} ms {total / calls:7.2f}")
-    options = Options()
+    options = DdpOptions()
     problem, U = reach(m, 100)
     solved = ddp.solve(problem, U, options)
     whole = least_seconds(lambda: ddp.solve(problem, U, options))

@@ -12,7 +12,7 @@ import numpy as np
 
 from labs.algorithms import sqp
 from labs.algorithms.collocation import Collocation
-from labs.algorithms.sqp import Iterate, Options
+from labs.algorithms.sqp import SqpIterate, SqpOptions
 from labs.models.mechanisms import mechanism
 from labs.problems.continuous_control import ContinuousProblem
 from labs.tasks.motion.continuous import MotionLimits, continuous_motion
@@ -22,7 +22,7 @@ from tests.labs.algorithms.transcriptions import straight
 
 N = 100
 SCHEME = "trapezoidal"
-GAUSS_NEWTON = Options("gauss-newton")
+GAUSS_NEWTON = SqpOptions("gauss-newton")
 LATE = 1e-5
 """KKT residual of a late iteration."""
 PHASES = ("derivatives", "QP", "line search")
@@ -73,7 +73,7 @@ def reach(steps: int) -> ContinuousProblem:
     return continuous_motion("ur5", "weighted", 0.5, limits=limits, target=target)
 
 
-def iteration(program: Collocation, at: Iterate) -> tuple[dict[str, float], float]:
+def iteration(program: Collocation, at: SqpIterate) -> tuple[dict[str, float], float]:
     """[s] of each phase and of all, the least of many times the same iteration by Gauss-Newton."""
     times, found = [], []
     for _ in range(ROUNDS):
@@ -83,7 +83,7 @@ def iteration(program: Collocation, at: Iterate) -> tuple[dict[str, float], floa
     return {phase: min(f.seconds[phase] for f in found) for phase in PHASES}, min(times)
 
 
-def second(steps: int) -> tuple[Collocation, Iterate]:
+def second(steps: int) -> tuple[Collocation, SqpIterate]:
     """The programme, where its second iteration begins."""
     problem = reach(steps)
     program, guess = Collocation(problem, steps, SCHEME), straight(problem, steps)

@@ -5,7 +5,7 @@ from scipy.linalg import expm
 
 from labs.algorithms import mpc
 from labs.algorithms.linear_mpc import Form, LinearPlanner
-from labs.algorithms.mpc import Options
+from labs.algorithms.mpc import MpcOptions
 from labs.problems.linear_mpc import LinearMpcProblem
 from labs.problems.polyhedron import box
 from labs.problems.receding_horizon import Plan
@@ -62,7 +62,7 @@ def _loop(
 ) -> tuple[float, np.ndarray, int]:
     """The mean time of a QP [ms], the controls (PERIODS, m), and how many limits are active at
     first."""
-    planner, options = LinearPlanner(problem, form), Options()
+    planner, options = LinearPlanner(problem, form), MpcOptions()
     guess: Plan | None = None
     times, controls, active = [], [], []
 

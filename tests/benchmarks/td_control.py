@@ -11,7 +11,7 @@ from labs.algorithms.td_control import Q_LEARNING, SARSA, SARSA_LAMBDA, SARSA_N,
 from labs.engine.catalog import find
 from labs.engine.run import World
 from labs.problems.episodes import EpisodicTask, UpdateRule
-from labs.reinforcement_learning.td_control.tasks import LearningTask, grid_task, pendulum_task
+from labs.reinforcement_learning.td_control.tasks import ControlTask, grid_task, pendulum_task
 from labs.tasks.grid_world.map import MAPS
 
 ROUNDS = 7
@@ -54,7 +54,7 @@ def q_learning_steps() -> None:
         )
 
 
-def _compiled(task: LearningTask, method: int, episodes: int) -> float:
+def _compiled(task: ControlTask, method: int, episodes: int) -> float:
     """Transitions a second of one learner."""
     learners = init((task.mdp.X, task.mdp.U), 1, np.random.default_rng(0))
     begin = time.process_time()

@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import Page, expect
 
-from labs.engine.catalog import Entry, catalog
+from labs.engine.catalog import CatalogEntry, catalog
 from labs.params import Knob
 from server.articles import render
 from tests.browser.conftest import screenshot
@@ -30,7 +30,7 @@ FIT = """selector => {
 
 
 @pytest.mark.parametrize("entry", SHIPPED, ids=lambda entry: entry.slug)
-def test_every_experiment_and_a_slider_set_what_they_say(page: Page, entry: Entry) -> None:
+def test_every_experiment_and_a_slider_set_what_they_say(page: Page, entry: CatalogEntry) -> None:
     # Pressing is the page's own; drawing every scene in software would take minutes.
     page.set_viewport_size({"width": 1366, "height": 650})  # a laptop's screen, less its bars
     lab = LabPage(page, scene=False).open(entry.slug)

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import ArrayLike
 
 from labs import plots
-from labs.engine.catalog import Entry, catalog
+from labs.engine.catalog import CatalogEntry, catalog
 from labs.engine.run import World
 from labs.lab import State
 from labs.params import Choice, Knob, Text, Value
@@ -30,7 +30,7 @@ LOOKED_AT = 12
 """Iterations of a solver that are looked at."""
 
 
-def extremes(entry: Entry) -> Iterator[tuple[str, Value]]:
+def extremes(entry: CatalogEntry) -> Iterator[tuple[str, Value]]:
     """Both ends of every knob, every option of every choice, both sides of every toggle, and of a
     text what it says by default."""
     for name, tunable in entry.lab.Params.tunables.items():
@@ -48,7 +48,7 @@ def extremes(entry: Entry) -> Iterator[tuple[str, Value]]:
                 yield name, value
 
 
-def settings(entry: Entry) -> Iterator[tuple[str, Mapping[str, Value]]]:
+def settings(entry: CatalogEntry) -> Iterator[tuple[str, Mapping[str, Value]]]:
     """Every preset and every experiment."""
     for name, preset in entry.lab.presets.items():
         yield f"preset {name}", preset
@@ -56,7 +56,7 @@ def settings(entry: Entry) -> Iterator[tuple[str, Mapping[str, Value]]]:
         yield f"experiment {experiment.title}", experiment.settings
 
 
-def variants(entry: Entry) -> Iterator[Mapping[str, Value]]:
+def variants(entry: CatalogEntry) -> Iterator[Mapping[str, Value]]:
     """The defaults, every preset, every experiment, and every other option of every choice that
     acts."""
     yield {}
@@ -357,7 +357,7 @@ def plain(value: Any) -> Any:
 
 
 def begun(
-    entry: Entry,
+    entry: CatalogEntry,
     changes: Mapping[str, Value] | None = None,
     steps: int = 3,
     iterations: int = LOOKED_AT,
@@ -400,7 +400,9 @@ def drawn(world: World) -> Any:
     return plain(calls)
 
 
-def moved(entry: Entry, changes: Mapping[str, Value] | None = None, steps: int = 30) -> World:
+def moved(
+    entry: CatalogEntry, changes: Mapping[str, Value] | None = None, steps: int = 30
+) -> World:
     """A world after its solver and some steps."""
     world = World(entry, changes, seed=1)
     while world.solving:

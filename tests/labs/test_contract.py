@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from labs import plots
-from labs.engine.catalog import Entry
+from labs.engine.catalog import CatalogEntry
 from labs.engine.events import Event
 from labs.engine.headless import run
 from labs.engine.run import World
@@ -79,7 +79,7 @@ every_lab = pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.sl
 
 
 @every_lab
-def test_a_lab_introduces_itself(entry: Entry) -> None:
+def test_a_lab_introduces_itself(entry: CatalogEntry) -> None:
     lab = entry.lab
     assert lab.title.strip() == lab.title != ""
     chapter = lab.section.split(".")[0]
@@ -92,7 +92,7 @@ def test_a_lab_introduces_itself(entry: Entry) -> None:
 
 
 @every_lab
-def test_every_parameter_is_documented(entry: Entry) -> None:
+def test_every_parameter_is_documented(entry: CatalogEntry) -> None:
     assert entry.lab.Params.model_config["frozen"]
     for name, tunable in entry.lab.Params.tunables.items():
         assert tunable.help.endswith("."), f"{name}: help is a sentence"
@@ -115,7 +115,7 @@ def test_every_parameter_is_documented(entry: Entry) -> None:
 
 
 @every_lab
-def test_what_is_said_not_to_act_changes_nothing(entry: Entry) -> None:
+def test_what_is_said_not_to_act_changes_nothing(entry: CatalogEntry) -> None:
     """At the defaults, and under options of each choice that others depend on, as many as it takes
     to see all that idles: it has another value, beside a twin where it has its default."""
     governors = {
@@ -141,7 +141,7 @@ def test_what_is_said_not_to_act_changes_nothing(entry: Entry) -> None:
                 assert drawn(world) == drawn(twin)
 
 
-def other(entry: Entry, name: str) -> Value:
+def other(entry: CatalogEntry, name: str) -> Value:
     """Some value that is not the default."""
     default = getattr(entry.lab.Params(), name)
     ready = [dict(values)[name] for _, values in settings(entry) if name in values]
@@ -150,13 +150,13 @@ def other(entry: Entry, name: str) -> Value:
 
 
 @every_lab
-def test_defaults_are_valid(entry: Entry) -> None:
+def test_defaults_are_valid(entry: CatalogEntry) -> None:
     defaults = entry.lab.Params()
     assert defaults.change(defaults.model_dump()) == defaults
 
 
 @every_lab
-def test_settings_that_go_with_a_choice_are_valid(entry: Entry) -> None:
+def test_settings_that_go_with_a_choice_are_valid(entry: CatalogEntry) -> None:
     defaults = entry.lab.Params()
     for name, by_value in entry.lab.choice_settings.items():
         assert defaults.tunables[name].effect == "restart", "or a run could not be reproduced"
@@ -166,7 +166,7 @@ def test_settings_that_go_with_a_choice_are_valid(entry: Entry) -> None:
 
 
 @every_lab
-def test_parameters_survive_as_text(entry: Entry) -> None:
+def test_parameters_survive_as_text(entry: CatalogEntry) -> None:
     """A link and a command line hold every extreme value exactly."""
     params = entry.lab.Params
     for name, value in extremes(entry):
@@ -176,14 +176,16 @@ def test_parameters_survive_as_text(entry: Entry) -> None:
 
 
 @pytest.mark.parametrize(("entry", "changes"), SETTINGS)
-def test_presets_and_experiments_run(entry: Entry, changes: dict[str, Value]) -> None:
+def test_presets_and_experiments_run(entry: CatalogEntry, changes: dict[str, Value]) -> None:
     world = run(entry.slug, changes, seconds=SECONDS)
     assert {name: getattr(world.params, name) for name in changes} == changes
     check(world)
 
 
 @every_lab
-def test_an_experiment_predicts_what_is_measured_and_compares_with_what_runs(entry: Entry) -> None:
+def test_an_experiment_predicts_what_is_measured_and_compares_with_what_runs(
+    entry: CatalogEntry,
+) -> None:
     for experiment in render(entry).experiments:
         with under(experiment.title):
             world = World(entry, experiment.settings)
@@ -195,7 +197,7 @@ def test_an_experiment_predicts_what_is_measured_and_compares_with_what_runs(ent
 
 
 @every_lab
-def test_names_do_not_collide(entry: Entry) -> None:
+def test_names_do_not_collide(entry: CatalogEntry) -> None:
     lab = entry.lab
     assert len({action.name for action in lab.actions}) == len(lab.actions)
     for action in lab.actions:
@@ -218,7 +220,7 @@ solvers = pytest.mark.parametrize(
 )
 
 
-def iterated(entry: Entry) -> tuple[World, list[State]]:
+def iterated(entry: CatalogEntry) -> tuple[World, list[State]]:
     """A world after some iterations, and the state after each."""
     world = World(entry)
     states: list[State] = []
@@ -229,7 +231,7 @@ def iterated(entry: Entry) -> tuple[World, list[State]]:
 
 
 @solvers
-def test_looking_back_shows_what_was(entry: Entry) -> None:
+def test_looking_back_shows_what_was(entry: CatalogEntry) -> None:
     """A snapshot is complete: accepted again, and after later ones, it gives the same state."""
     world, states = iterated(entry)
     for i in (*reversed(range(len(states))), 0, len(states) - 1):
@@ -239,7 +241,7 @@ def test_looking_back_shows_what_was(entry: Entry) -> None:
 
 
 @solvers
-def test_a_solver_counts_its_iterations_and_says_why_it_ends(entry: Entry) -> None:
+def test_a_solver_counts_its_iterations_and_says_why_it_ends(entry: CatalogEntry) -> None:
     world, states = iterated(entry)
     assert world.snapshots.iterations == list(range(1, len(states) + 1))
     last = world.latest
@@ -249,7 +251,7 @@ def test_a_solver_counts_its_iterations_and_says_why_it_ends(entry: Entry) -> No
 
 
 @solvers
-def test_a_snapshot_is_plain_deterministic_and_never_written_into(entry: Entry) -> None:
+def test_a_snapshot_is_plain_deterministic_and_never_written_into(entry: CatalogEntry) -> None:
     """Its durations stand under "seconds" alone; all else is the same each time."""
     world, _ = iterated(entry)
     before = [
@@ -266,7 +268,7 @@ def test_a_snapshot_is_plain_deterministic_and_never_written_into(entry: Entry) 
 
 
 @solvers
-def test_a_solution_is_saved_and_taken_up_again(entry: Entry) -> None:
+def test_a_solution_is_saved_and_taken_up_again(entry: CatalogEntry) -> None:
     for form in FORMS:
         found, _ = iterated(entry)
         world = World(entry, solution=Solution.read(found.solution().write(form)))
@@ -290,7 +292,7 @@ def _without_durations(snapshot: Snapshot | None) -> dict[str, Any]:
 
 
 @every_lab
-def test_plots_name_real_channels(entry: Entry) -> None:
+def test_plots_name_real_channels(entry: CatalogEntry) -> None:
     """Of every plot where it is shown."""
     unseen = set(range(len(entry.lab.plots)))
     for world in chain([moved(entry)], (World(entry, changes) for changes in variants(entry))):
@@ -387,7 +389,7 @@ def looks(trace: Trace, pictured: Mapping[str, np.ndarray]) -> set[tuple[str, in
 
 
 @every_lab
-def test_labels_fit_what_they_name_whatever_is_chosen(entry: Entry) -> None:
+def test_labels_fit_what_they_name_whatever_is_chosen(entry: CatalogEntry) -> None:
     """As many names as components, bars and rows, and one unit for each; never two systems'."""
     lab = entry.lab
     for changes in variants(entry):
@@ -419,7 +421,7 @@ def named(trace: Trace) -> tuple[str, ...]:
 
 
 @every_lab
-def test_every_channel_is_measured_somewhere(entry: Entry) -> None:
+def test_every_channel_is_measured_somewhere(entry: CatalogEntry) -> None:
     """A misspelt one would never show a value, whatever is set."""
     wanted = {name for plot in entry.lab.plots for name in plots.measured(plot)}
     optional = {name for plot in entry.lab.plots for name in optional_fields(plot)}
@@ -436,7 +438,7 @@ def test_every_channel_is_measured_somewhere(entry: Entry) -> None:
 
 
 @every_lab
-def test_channels_keep_their_shape_and_stay_finite(entry: Entry) -> None:
+def test_channels_keep_their_shape_and_stay_finite(entry: CatalogEntry) -> None:
     world = World(entry)
     lab = entry.lab
     optional = {name for plot in lab.plots for name in plots.measured(plot)}
@@ -454,14 +456,14 @@ def test_channels_keep_their_shape_and_stay_finite(entry: Entry) -> None:
 # Extremes -------------------------------------------------------------------------------------
 
 
-def brief(entry: Entry, changes: Mapping[str, Value], iterations: int = BEGINNING) -> World:
+def brief(entry: CatalogEntry, changes: Mapping[str, Value], iterations: int = BEGINNING) -> World:
     """A short run that the solver has only begun."""
     events = [Event(0, "solve", "iterate", iterations)] if entry.lab.has_solver() else []
     return run(entry.slug, changes, seconds=BRIEFLY, events=events)
 
 
 @every_lab
-def test_every_tunable_starts_at_one_extreme_and_changes_to_the_others(entry: Entry) -> None:
+def test_every_tunable_starts_at_one_extreme_and_changes_to_the_others(entry: CatalogEntry) -> None:
     """Each that acts by default, while the others stand still: a run that begins at one of its
     extremes, now the first and now the last, goes on through the others to its default."""
     lab = entry.lab
@@ -485,7 +487,7 @@ def test_every_tunable_starts_at_one_extreme_and_changes_to_the_others(entry: En
 
 
 @every_lab
-def test_what_acts_under_a_choice_runs_at_its_extremes_there(entry: Entry) -> None:
+def test_what_acts_under_a_choice_runs_at_its_extremes_there(entry: CatalogEntry) -> None:
     """All that act under the same choices at once: first at one end, then through the others."""
     lab, options = entry.lab, ends(entry)
     governed: dict[tuple[tuple[str, Value], ...], list[str]] = {}
@@ -507,7 +509,7 @@ def test_what_acts_under_a_choice_runs_at_its_extremes_there(entry: Entry) -> No
                 check(world)
 
 
-def ends(entry: Entry) -> dict[str, list[Value]]:
+def ends(entry: CatalogEntry) -> dict[str, list[Value]]:
     """The extremes of each tunable."""
     found: dict[str, list[Value]] = {}
     for name, value in extremes(entry):
@@ -516,7 +518,7 @@ def ends(entry: Entry) -> dict[str, list[Value]]:
 
 
 @every_lab
-def test_random_corners_run(entry: Entry) -> None:
+def test_random_corners_run(entry: CatalogEntry) -> None:
     """All tunables at an extreme at once."""
     options = ends(entry)
     rng = np.random.default_rng(0)
@@ -530,7 +532,7 @@ def test_random_corners_run(entry: Entry) -> None:
 
 
 @functools.cache
-def offers(entry: Entry) -> list[tuple[Mapping[str, Value], Offered]]:
+def offers(entry: CatalogEntry) -> list[tuple[Mapping[str, Value], Offered]]:
     """In which settings what can be dragged or clicked."""
     found = []
     for changes in variants(entry):
@@ -540,7 +542,7 @@ def offers(entry: Entry) -> list[tuple[Mapping[str, Value], Offered]]:
 
 
 @every_lab
-def test_handles_are_declared(entry: Entry) -> None:
+def test_handles_are_declared(entry: CatalogEntry) -> None:
     """Every one that is drawn in some setting, and no other."""
     drawn = set().union(*(offered.offered for _, offered in offers(entry)))
     for name in drawn:
@@ -551,7 +553,7 @@ def test_handles_are_declared(entry: Entry) -> None:
 
 
 @every_lab
-def test_every_handle_that_is_drawn_acts(entry: Entry) -> None:
+def test_every_handle_that_is_drawn_acts(entry: CatalogEntry) -> None:
     """Dragged by a little and out of the picture both ways, beside a twin that is left alone; in
     the first settings that offer it."""
     tried: Counter[str] = Counter()
@@ -577,7 +579,7 @@ def test_every_handle_that_is_drawn_acts(entry: Entry) -> None:
 
 
 @every_lab
-def test_every_board_that_is_drawn_acts(entry: Entry) -> None:
+def test_every_board_that_is_drawn_acts(entry: CatalogEntry) -> None:
     """A click in one of its cells changes a parameter, at the latest after others were clicked."""
     for changes, offered in offers(entry):
         if not offered.boards:
@@ -601,7 +603,7 @@ def clicked(world: World, board: str, cell: Point) -> bool:
 
 
 @every_lab
-def test_every_action_acts(entry: Entry) -> None:
+def test_every_action_acts(entry: CatalogEntry) -> None:
     """In some setting, if need be after a drag, within some steps, beside a twin left alone."""
     for action in entry.lab.actions:
         assert any(
@@ -611,7 +613,7 @@ def test_every_action_acts(entry: Entry) -> None:
         ), f"{action.name} changes something"
 
 
-def acts(entry: Entry, changes: Mapping[str, Value], action: Action, dragged: bool) -> bool:
+def acts(entry: CatalogEntry, changes: Mapping[str, Value], action: Action, dragged: bool) -> bool:
     """Whether what is seen differs within half a second after it was pressed."""
     world, twin = begun(entry, changes, 20), begun(entry, changes, 20)
     for name, (x, y, z) in Offered(twin).handles.items() if dragged else ():
@@ -637,7 +639,7 @@ def test_nothing_can_be_done_only_where_it_is_said() -> None:
 # Determinism and plain data -------------------------------------------------------------------
 
 
-def _eventful(entry: Entry) -> list[Event]:
+def _eventful(entry: CatalogEntry) -> list[Event]:
     """Every action pressed, and every live knob moved, one after the other."""
     events = [Event(5 + i, "press", action.name) for i, action in enumerate(entry.lab.actions)]
     for i, (name, tunable) in enumerate(entry.lab.Params.tunables.items()):
@@ -646,7 +648,7 @@ def _eventful(entry: Entry) -> list[Event]:
     return events if entry.lab.has_world() else []
 
 
-def _noisy(entry: Entry) -> dict[str, Value]:
+def _noisy(entry: CatalogEntry) -> dict[str, Value]:
     """Noise on, where a lab has any."""
     changes: dict[str, Value] = {}
     for name, tunable in entry.lab.Params.tunables.items():
@@ -656,7 +658,7 @@ def _noisy(entry: Entry) -> dict[str, Value]:
 
 
 @every_lab
-def test_the_same_seed_and_events_give_the_same_run(entry: Entry) -> None:
+def test_the_same_seed_and_events_give_the_same_run(entry: CatalogEntry) -> None:
     a = run(entry.slug, _noisy(entry), seconds=SECONDS, seed=3, events=_eventful(entry))
     with anew():
         b = run(entry.slug, _noisy(entry), seconds=SECONDS, seed=3, events=_eventful(entry))
@@ -665,13 +667,13 @@ def test_the_same_seed_and_events_give_the_same_run(entry: Entry) -> None:
 
 
 @pytest.mark.parametrize("entry", [e for e in ENTRIES if _noisy(e)], ids=lambda entry: entry.slug)
-def test_another_seed_gives_another_run_where_there_is_noise(entry: Entry) -> None:
+def test_another_seed_gives_another_run_where_there_is_noise(entry: CatalogEntry) -> None:
     a, b = (run(entry.slug, _noisy(entry), seconds=SECONDS, seed=seed) for seed in (3, 4))
     assert a.recording().rows.tobytes() != b.recording().rows.tobytes()
 
 
 @every_lab
-def test_runs_do_not_disturb_each_other(entry: Entry) -> None:
+def test_runs_do_not_disturb_each_other(entry: CatalogEntry) -> None:
     """Two worlds of one lab, stepped in turns, go as each alone: no state hides in the lab."""
     alone = moved(entry, _noisy(entry), steps=40)
     with anew():
@@ -687,7 +689,7 @@ def test_runs_do_not_disturb_each_other(entry: Entry) -> None:
 
 
 @every_lab
-def test_a_copied_state_continues_the_same(entry: Entry) -> None:
+def test_a_copied_state_continues_the_same(entry: CatalogEntry) -> None:
     world = moved(entry, _noisy(entry))
     copies = [copy.deepcopy(world.state), pickle.loads(pickle.dumps(world.state))]  # noqa: S301
     ends = []
@@ -699,7 +701,7 @@ def test_a_copied_state_continues_the_same(entry: Entry) -> None:
 
 
 @every_lab
-def test_a_step_leaves_the_old_state_alone(entry: Entry) -> None:
+def test_a_step_leaves_the_old_state_alone(entry: CatalogEntry) -> None:
     world = moved(entry, _noisy(entry))
     lab, params, old = world.lab, world.params, world.state
     before = copy.deepcopy(old)
@@ -717,7 +719,7 @@ def test_a_step_leaves_the_old_state_alone(entry: Entry) -> None:
     "entry", [e for e in ENTRIES if e.lab.has_solver()], ids=lambda entry: entry.slug
 )
 def test_a_solver_ends_with_a_reason_and_accepting_leaves_the_old_state_alone(
-    entry: Entry,
+    entry: CatalogEntry,
 ) -> None:
     lab, world = entry.lab, World(entry)
     snapshots: list[Snapshot] = []
@@ -732,7 +734,7 @@ def test_a_solver_ends_with_a_reason_and_accepting_leaves_the_old_state_alone(
 
 
 @every_lab
-def test_a_world_in_trouble_stays_where_it_was(entry: Entry) -> None:
+def test_a_world_in_trouble_stays_where_it_was(entry: CatalogEntry) -> None:
     world = moved(entry)
     world.state = copy.deepcopy(world.state)
     world.state.trouble = "It went wrong: change something."

@@ -6,7 +6,7 @@ pressed, handles dragged and let go, iterations taken in and looked back at."""
 import numpy as np
 import pytest
 
-from labs.engine.catalog import Entry
+from labs.engine.catalog import CatalogEntry
 from labs.engine.run import World
 from labs.errors import LabError
 from labs.params import Choice, Knob, Text, Tunable, Value
@@ -41,7 +41,7 @@ TOLD = 15
 class Session:
     """A world and somebody who plays with it."""
 
-    def __init__(self, entry: Entry, seed: int) -> None:
+    def __init__(self, entry: CatalogEntry, seed: int) -> None:
         self.entry, self.rng = entry, np.random.default_rng(seed)
         self.world = World(entry, seed=seed)
         self.log = [f"seed {seed}"]
@@ -139,7 +139,7 @@ class Session:
         self.world.reset()
 
 
-def play(entry: Entry, seed: int, operations: int) -> None:
+def play(entry: CatalogEntry, seed: int, operations: int) -> None:
     """A session of so many operations."""
     session = Session(entry, seed)
     with under(session):
@@ -151,12 +151,12 @@ every_lab = pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.sl
 
 
 @every_lab
-def test_whatever_is_done_the_world_is_well(entry: Entry) -> None:
+def test_whatever_is_done_the_world_is_well(entry: CatalogEntry) -> None:
     play(entry, 1, SHORT)
 
 
 @pytest.mark.study
 @pytest.mark.parametrize("seed", range(2, 7))
 @every_lab
-def test_whatever_is_done_for_long_the_world_is_well(entry: Entry, seed: int) -> None:
+def test_whatever_is_done_for_long_the_world_is_well(entry: CatalogEntry, seed: int) -> None:
     play(entry, seed, LONG)

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from labs.engine.catalog import Entry, catalog, find
+from labs.engine.catalog import CatalogEntry, catalog, find
 from server.articles import Article, render, render_text, words
 from server.formulas import ArticleError, tex
 from server.line_breaks import statements
@@ -22,11 +22,11 @@ button = "Try <it>"
 
 
 @pytest.fixture
-def entry() -> Entry:
+def entry() -> CatalogEntry:
     return catalog()["joint-control"]
 
 
-def write(entry: Entry, text: str) -> Article:
+def write(entry: CatalogEntry, text: str) -> Article:
     return render_text(entry, text)
 
 
@@ -35,7 +35,7 @@ def experiment(more: str = "", title: str = "Sag") -> str:
 
 
 @pytest.mark.parametrize("entry", COURSE, ids=lambda entry: entry.slug)
-def test_every_article_renders(entry: Entry) -> None:
+def test_every_article_renders(entry: CatalogEntry) -> None:
     article = render(entry)
     assert "<math" in article.html
     assert article.experiments
@@ -43,7 +43,7 @@ def test_every_article_renders(entry: Entry) -> None:
     assert article.html.count("data-experiment=") == len(article.experiments)
 
 
-def test_formulas_become_mathml(entry: Entry) -> None:
+def test_formulas_become_mathml(entry: CatalogEntry) -> None:
     html = write(entry, "Inline $x^2$ and\n\n$$\\frac{a}{b}$$\n").html
     assert "<math><msup>" in html
     assert '<math display="block"><mfrac>' in html
@@ -67,21 +67,21 @@ def test_a_formula_breaks_between_its_terms_alone(source: str, pieces: list[list
     assert statements(source) == pieces
 
 
-def test_a_text_may_begin_with_a_formula_and_end_with_a_number(entry: Entry) -> None:
+def test_a_text_may_begin_with_a_formula_and_end_with_a_number(entry: CatalogEntry) -> None:
     assert "<math><mi>M</mi></math> is 1.40 m²" in write(entry, "$M$ is 1.40 m²").html
 
 
-def test_bad_tex_names_the_article_and_the_formula(entry: Entry) -> None:
+def test_bad_tex_names_the_article_and_the_formula(entry: CatalogEntry) -> None:
     with pytest.raises(ArticleError, match=r"joint-control.*\\\\nonsense"):
         write(entry, "Here $\\nonsense{x}$.")
 
 
-def test_bad_tex_inside_an_experiment_is_found_too(entry: Entry) -> None:
+def test_bad_tex_inside_an_experiment_is_found_too(entry: CatalogEntry) -> None:
     with pytest.raises(ArticleError, match="frac"):
         write(entry, experiment().replace("$e$", "$\\\\frac{1$"))
 
 
-def test_html_is_text(entry: Entry) -> None:
+def test_html_is_text(entry: CatalogEntry) -> None:
     html = write(entry, "<script>alert(1)</script> <b>bold</b>\n\n<img src=x>\n").html
     assert "<script" not in html
     assert "<b>" not in html
@@ -89,11 +89,11 @@ def test_html_is_text(entry: Entry) -> None:
     assert "&lt;script&gt;" in html
 
 
-def test_a_title_the_page_shows_itself_is_not_repeated(entry: Entry) -> None:
+def test_a_title_the_page_shows_itself_is_not_repeated(entry: CatalogEntry) -> None:
     assert "<h1" not in write(entry, "# Joint control\n\nText.").html
 
 
-def test_tables_can_scroll(entry: Entry) -> None:
+def test_tables_can_scroll(entry: CatalogEntry) -> None:
     html = write(entry, "| a | b |\n|---|---|\n| 1 | 2 |\n").html
     assert html.startswith('<div class="table"><table>')
     assert "<td>1</td>" in html
@@ -109,11 +109,11 @@ def test_a_drawing_beside_the_article_stands_in_the_page() -> None:
             render_text(entry, f"![]({wrong})")
 
 
-def test_other_fenced_blocks_stay_code(entry: Entry) -> None:
+def test_other_fenced_blocks_stay_code(entry: CatalogEntry) -> None:
     assert "<pre><code" in write(entry, "```python\nx < 1\n```\n").html
 
 
-def test_a_symbol_with_a_slider_names_it(entry: Entry) -> None:
+def test_a_symbol_with_a_slider_names_it(entry: CatalogEntry) -> None:
     html = write(entry, "The gain $k_p$.\n\n$$\\tau = k_p\\,e$$\n").html
     symbol = '<span class="symbol" role="button" tabindex="0" data-param="kp" aria-label="k_p">'
     assert symbol + "<math>" in html
@@ -136,7 +136,7 @@ def test_a_greek_letter_in_a_formula_that_stands_alone_is_its_knob() -> None:
     assert "\u2061" in html("$$\\sin \\gamma$$")  # applies the function
 
 
-def test_what_touches_a_formula_stays_on_its_line(entry: Entry) -> None:
+def test_what_touches_a_formula_stays_on_its_line(entry: CatalogEntry) -> None:
     html = write(entry, "$x$, not ($y$), & the $z$ <alone>, as $n$-th; $a$").html
     kept = re.findall(r'<span class="joined">(.*?)<math>.*?</math>(.*?)</span>', html)
     assert kept == [("", ","), ("(", "),"), ("", "-th;")]
@@ -145,7 +145,7 @@ def test_what_touches_a_formula_stays_on_its_line(entry: Entry) -> None:
     assert "</span> <math><mi>a</mi></math>" in html
 
 
-def test_an_experiment_is_read_and_shown(entry: Entry) -> None:
+def test_an_experiment_is_read_and_shown(entry: CatalogEntry) -> None:
     article = write(entry, experiment('watch = "Error"\n[set]\nkp = 200.0\n'))
     (found,) = article.experiments
     assert (found.title, found.button, found.watch) == ("Sag", "Try <it>", ("Error",))
@@ -156,7 +156,7 @@ def test_an_experiment_is_read_and_shown(entry: Entry) -> None:
     assert found.observe in article.html
 
 
-def test_an_experiment_says_what_makes_its_promise_visible(entry: Entry) -> None:
+def test_an_experiment_says_what_makes_its_promise_visible(entry: CatalogEntry) -> None:
     more = """watch = ["Error", "Torque"]
 highlight = "RMS error"
 window = 3
@@ -175,7 +175,7 @@ kp = 400.0"""
     assert "<mi>k</mi><mi>p</mi></msub></math> = 400 N·m/rad" in found.compared
 
 
-def test_what_an_experiment_does_not_say_has_its_default(entry: Entry) -> None:
+def test_what_an_experiment_does_not_say_has_its_default(entry: CatalogEntry) -> None:
     (found,) = write(entry, experiment("")).experiments
     assert found.describe() == {
         "title": "Sag",
@@ -208,14 +208,16 @@ CURVE = 'watch = "Error"\n[predict]\nask = "Sketch it"\ncurve = "error[1]"\nrang
         (CURVE, {"plot": "Error", "unit": "rad", "range": (-1.0, 1.0)}, "Sketch it</p>"),
     ],
 )
-def test_a_prediction_is_asked_for(entry: Entry, more: str, told: object, shown: str) -> None:
+def test_a_prediction_is_asked_for(
+    entry: CatalogEntry, more: str, told: object, shown: str
+) -> None:
     article = write(entry, experiment(more))
     asked = article.experiments[0].describe()["predict"]
     assert {key: asked[key] for key in told} == told  # type: ignore[attr-defined]
     assert shown in article.html
 
 
-def test_titles_are_escaped(entry: Entry) -> None:
+def test_titles_are_escaped(entry: CatalogEntry) -> None:
     assert "<i>" not in write(entry, experiment(title="<i>Sag</i>")).html
 
 
@@ -261,7 +263,7 @@ def test_titles_are_escaped(entry: Entry) -> None:
     ],
 )
 def test_an_experiment_its_lab_cannot_run_is_refused(
-    entry: Entry, more: str, sentence: str
+    entry: CatalogEntry, more: str, sentence: str
 ) -> None:
     with pytest.raises(ArticleError, match="joint-control") as caught:
         write(entry, experiment(more))
@@ -275,13 +277,13 @@ def test_what_needs_time_is_refused_where_none_runs(more: str) -> None:
 
 
 @pytest.mark.parametrize("key", ["title", "question", "observe", "button"])
-def test_an_experiment_needs_its_texts(entry: Entry, key: str) -> None:
+def test_an_experiment_needs_its_texts(entry: CatalogEntry, key: str) -> None:
     text = "\n".join(line for line in experiment().split("\n") if not line.startswith(key))
     with pytest.raises(ArticleError, match=f"lacks {key}"):
         write(entry, text)
 
 
-def test_an_answer_may_begin_with_a_number(entry: Entry) -> None:
+def test_an_answer_may_begin_with_a_number(entry: CatalogEntry) -> None:
     text = experiment().replace("It **stays**.", "22. That is all.")
     (found,) = write(entry, text).experiments
     assert "<p>22. That is all.</p>" in found.observe
@@ -298,5 +300,5 @@ def test_words_are_distinct_and_without_formulas() -> None:
     assert words("The arm, the ARM $\\alpha$ sags") == "arm sags the"
 
 
-def test_an_article_is_rendered_once(entry: Entry) -> None:
+def test_an_article_is_rendered_once(entry: CatalogEntry) -> None:
     assert render(entry) is render(dataclasses.replace(entry))

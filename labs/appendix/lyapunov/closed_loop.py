@@ -54,7 +54,7 @@ def loop_system(name: str) -> PlaneSystem:
             return plane_system("oscillator")
 
 
-class LoopSettings(NamedTuple):
+class ClosedLoopSettings(NamedTuple):
     """What a closed loop depends on."""
 
     system: str
@@ -72,7 +72,7 @@ class LoopSettings(NamedTuple):
 class ClosedLoop:
     """x+ = f(x), with what is linear about it."""
 
-    settings: LoopSettings
+    settings: ClosedLoopSettings
     _grid_ahead: list[np.ndarray] = field(default_factory=list, compare=False, repr=False)
 
     @property
@@ -164,6 +164,6 @@ def stopped(X: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=16)
-def closed_loop(settings: LoopSettings) -> ClosedLoop:
+def closed_loop(settings: ClosedLoopSettings) -> ClosedLoop:
     """The loop of these settings."""
     return ClosedLoop(settings)

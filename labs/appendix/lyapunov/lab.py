@@ -10,8 +10,8 @@ import numpy as np
 from labs.appendix.lyapunov.params import LyapunovParams
 from labs.appendix.lyapunov.picture import draw
 from labs.appendix.lyapunov.plots import PLOTS, conditions, map_fields, run_fields
-from labs.appendix.lyapunov.runs import STEPS, Runs, advance, let_loose, look
-from labs.appendix.lyapunov.study import Study, study
+from labs.appendix.lyapunov.runs import STEPS, StateEnsemble, advance, let_loose, look
+from labs.appendix.lyapunov.study import LyapunovAnalysis, study
 from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
 from labs.resumable import run_to_completion
@@ -36,10 +36,10 @@ class LyapunovState(State):
     body_V: float = 0.0
     steps: int = 0
     """World steps done."""
-    study: Study | None = None
+    study: LyapunovAnalysis | None = None
     failure: str = ""
     """Why there is no V."""
-    runs: Runs | None = None
+    runs: StateEnsemble | None = None
 
 
 class Lyapunov(Lab[LyapunovParams, LyapunovState]):
@@ -111,7 +111,9 @@ class Lyapunov(Lab[LyapunovParams, LyapunovState]):
         return replace(state, t=count * STEP, steps=count, x=x, u=u, runs=runs, body_V=body_V)
 
     @staticmethod
-    def _outside(params: LyapunovParams, found: Study, runs: Runs, V: np.ndarray) -> np.ndarray:
+    def _outside(
+        params: LyapunovParams, found: LyapunovAnalysis, runs: StateEnsemble, V: np.ndarray
+    ) -> np.ndarray:
         """Which of the runs (M,) are outside of the set."""
         if params.set == "box":
             return np.asarray(~params.box.contains(runs.X, 1e-9))
@@ -133,7 +135,7 @@ class Lyapunov(Lab[LyapunovParams, LyapunovState]):
         """The states start anew: they belong to the set of before."""
         data = dict(snapshot.data)
         failure = data.pop("failure")
-        found = None if failure else Study(**data)
+        found = None if failure else LyapunovAnalysis(**data)
         return replace(state, study=found, failure=failure, runs=None)
 
     def edit(
@@ -190,7 +192,7 @@ class Lyapunov(Lab[LyapunovParams, LyapunovState]):
         draw(scene, params, state.study, state.runs, state.x)
 
 
-def _summary(found: Study) -> str:
+def _summary(found: LyapunovAnalysis) -> str:
     if found.decreasing == 1.0:
         return f"V decreases everywhere in the window, below the level {found.level_max:.3g}."
     percent = 100.0 * found.decreasing

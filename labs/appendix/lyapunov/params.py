@@ -9,7 +9,7 @@ from labs.appendix.lyapunov.closed_loop import (
     LOOPS,
     WINDOWS,
     ClosedLoop,
-    LoopSettings,
+    ClosedLoopSettings,
     closed_loop,
     loop_system,
 )
@@ -101,7 +101,7 @@ class LyapunovParams(Params):
     @property
     def loop(self) -> ClosedLoop:
         return closed_loop(
-            LoopSettings(
+            ClosedLoopSettings(
                 self.system, self.period, self.kp, self.kd, self.u_max,
                 (self.q_1, self.q_2), self.r, round(self.N), self.terminal == "riccati",
             )

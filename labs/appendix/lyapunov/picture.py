@@ -8,8 +8,8 @@ import numpy as np
 from labs.appendix.lyapunov.contours import level_lines
 from labs.appendix.lyapunov.params import LyapunovParams
 from labs.appendix.lyapunov.plots import relative_change
-from labs.appendix.lyapunov.runs import Runs
-from labs.appendix.lyapunov.study import NODES, Study, interpolated
+from labs.appendix.lyapunov.runs import StateEnsemble
+from labs.appendix.lyapunov.study import NODES, LyapunovAnalysis, interpolated
 from labs.colors import NO_VALUE, from_oklab, to_oklab
 from labs.scene import Color, Scene
 from labs.tasks.phase_plane.picture import LAYER, PhasePlane
@@ -33,8 +33,8 @@ HEIGHT = 0.75
 def draw(
     scene: Scene,
     params: LyapunovParams,
-    found: Study | None,
-    runs: Runs | None,
+    found: LyapunovAnalysis | None,
+    runs: StateEnsemble | None,
     x: np.ndarray,
 ) -> None:
     """The plane with all in it; the body, at the state x (2,)."""
@@ -56,7 +56,7 @@ class _Bowl:
     """Where states are on the flat plate, or on V as a surface over it; and what of the picture
     stays while V does."""
 
-    def __init__(self, plane: PhasePlane, found: Study) -> None:
+    def __init__(self, plane: PhasePlane, found: LyapunovAnalysis) -> None:
         self.plane = plane
         V = np.maximum(found.V, 0.0)
         size = found.level_max if found.level_max > 0.0 else float(np.median(V))
@@ -87,11 +87,13 @@ class _Bowl:
 
 
 @lru_cache(maxsize=4)
-def _bowl(found: Study, plane: PhasePlane) -> _Bowl:
+def _bowl(found: LyapunovAnalysis, plane: PhasePlane) -> _Bowl:
     return _Bowl(plane, found)
 
 
-def _draw_sets(scene: Scene, params: LyapunovParams, found: Study, picture: _Bowl) -> None:
+def _draw_sets(
+    scene: Scene, params: LyapunovParams, found: LyapunovAnalysis, picture: _Bowl
+) -> None:
     """Level lines, the border of where V falls, the set that is asked about, and of a box the
     largest level set within."""
     picture.lines(scene, "levels", picture.levels, "muted", 0.7, LAYER)
@@ -110,7 +112,7 @@ def _draw_sets(scene: Scene, params: LyapunovParams, found: Study, picture: _Bow
             scene.handle(f"axis {i}", picture.place(end, 0.0), 0.03)
 
 
-def _draw_runs(scene: Scene, runs: Runs, picture: _Bowl) -> None:
+def _draw_runs(scene: Scene, runs: StateEnsemble, picture: _Bowl) -> None:
     """All states, those that have left the set in red, with the last steps of each."""
     plane = picture.plane
     inside = ((plane.lower <= runs.X) & (plane.upper >= runs.X)).all(axis=1)

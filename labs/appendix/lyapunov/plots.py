@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from labs.appendix.lyapunov.params import LyapunovParams
-from labs.appendix.lyapunov.runs import STEPS, Runs
-from labs.appendix.lyapunov.study import NODES, Study
+from labs.appendix.lyapunov.runs import STEPS, StateEnsemble
+from labs.appendix.lyapunov.study import NODES, LyapunovAnalysis
 from labs.plots import Curves, HeatMap, Line, Note, Readout, TimeSeries, Trace
 
 PLOTS = (
@@ -57,7 +57,9 @@ LARGEST_CHANGE = 1.0
 TINY = 1e-12
 
 
-def run_fields(runs: Runs | None, found: Study | None) -> Mapping[str, np.ndarray]:
+def run_fields(
+    runs: StateEnsemble | None, found: LyapunovAnalysis | None
+) -> Mapping[str, np.ndarray]:
     """The runs against what the constants promise."""
     none = np.empty(0)
     fields = dict.fromkeys(("k", "farthest", "median", "V_most", "V_median"), none)
@@ -77,7 +79,7 @@ def run_fields(runs: Runs | None, found: Study | None) -> Mapping[str, np.ndarra
     }
 
 
-def _promised(found: Study | None) -> dict[str, np.ndarray]:
+def _promised(found: LyapunovAnalysis | None) -> dict[str, np.ndarray]:
     """Not known yet it is empty; where V is no Lyapunov function there is nothing."""
     if found is None:
         return dict.fromkeys(("k_bound", "bound", "V_bound"), np.empty(0))
@@ -88,7 +90,7 @@ def _promised(found: Study | None) -> dict[str, np.ndarray]:
     return {"k_bound": k, "bound": constants.bound(STEPS), "V_bound": rate**k}
 
 
-def map_fields(params: LyapunovParams, found: Study | None) -> Mapping[str, np.ndarray]:
+def map_fields(params: LyapunovParams, found: LyapunovAnalysis | None) -> Mapping[str, np.ndarray]:
     """The change of V over the window; empty where V = 0."""
     window = params.loop.window
     axes = [np.linspace(-half, half, NODES)[::COARSE] for half in window]
@@ -98,7 +100,7 @@ def map_fields(params: LyapunovParams, found: Study | None) -> Mapping[str, np.n
     return {"map_q": axes[0], "map_v": axes[1], "map_change": change}
 
 
-def relative_change(found: Study) -> np.ndarray:
+def relative_change(found: LyapunovAnalysis) -> np.ndarray:
     """(NODES, NODES): of V in a step, in parts of its size; NaN where V = 0."""
     size = np.abs(found.V)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -106,7 +108,7 @@ def relative_change(found: Study) -> np.ndarray:
     return np.clip(share, -LARGEST_CHANGE, LARGEST_CHANGE)
 
 
-def conditions(params: LyapunovParams, found: Study | None, failure: str) -> str:
+def conditions(params: LyapunovParams, found: LyapunovAnalysis | None, failure: str) -> str:
     """The three conditions on the set, each with its number."""
     if found is None:
         return failure or "Not known yet."

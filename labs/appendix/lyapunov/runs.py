@@ -14,7 +14,7 @@ STEPS = 120
 
 
 @dataclass(frozen=True, eq=False)
-class Runs:
+class StateEnsemble:
     """Where M states are, k steps after they were let loose. Arrays are never written into."""
 
     X: np.ndarray
@@ -37,15 +37,15 @@ class Runs:
         return len(self.V) - 1
 
 
-def let_loose(starts: np.ndarray) -> Runs:
+def let_loose(starts: np.ndarray) -> StateEnsemble:
     """At `starts` (M, 2), before the law has looked."""
     none = np.empty((0, len(starts)))
-    return Runs(
+    return StateEnsemble(
         starts, np.zeros((len(starts), 1)), starts[None], np.zeros(len(starts), bool), none, none
     )
 
 
-def look(runs: Runs, U: np.ndarray, V: np.ndarray, outside: np.ndarray) -> Runs:
+def look(runs: StateEnsemble, U: np.ndarray, V: np.ndarray, outside: np.ndarray) -> StateEnsemble:
     """The law has looked and holds U (M, 1); V (M,) now, and which are outside of the set."""
     distances = np.linalg.norm(runs.X, axis=1)
     return replace(
@@ -58,7 +58,7 @@ def look(runs: Runs, U: np.ndarray, V: np.ndarray, outside: np.ndarray) -> Runs:
     )
 
 
-def advance(runs: Runs, system: PlaneSystem, substeps: int) -> Runs:
+def advance(runs: StateEnsemble, system: PlaneSystem, substeps: int) -> StateEnsemble:
     """10 ms later, of `substeps` to the next look."""
     X = stopped(system.step(runs.X, runs.U, STEP))
     return replace(runs, X=X, clock=(runs.clock + 1) % substeps)

@@ -27,7 +27,7 @@ ROUNDED = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class LyapunovAnalysis:
     """What is known of one V and one loop. Its arrays are never written into."""
 
     V: np.ndarray
@@ -53,7 +53,7 @@ class Study:
         return LyapunovConstants(*map(float, self.alphas))
 
 
-def study(params: LyapunovParams) -> Resumable[Study | str]:
+def study(params: LyapunovParams) -> Resumable[LyapunovAnalysis | str]:
     """Looks at the grid; why there is no V, where there is none."""
     try:
         candidate = params.V
@@ -89,7 +89,7 @@ def study(params: LyapunovParams) -> Resumable[Study | str]:
         min(found.alpha_3, near.alpha_3),
     ]
     values = V.reshape(shape)[kept]
-    return Study(
+    return LyapunovAnalysis(
         values,
         (V_next - V).reshape(shape)[kept],
         level_max,

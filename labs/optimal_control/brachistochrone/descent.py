@@ -19,7 +19,7 @@ FLAT = 1e-15
 """v^2 / 2g [m] of what does not move."""
 
 
-class Motion(NamedTuple):
+class BeadMotion(NamedTuple):
     """At k instants."""
 
     point: np.ndarray
@@ -52,7 +52,7 @@ class Descent:
         """[s] to B, infinite if it does not get there."""
         return float(self.clock[-1]) if self.arrived else float("inf")
 
-    def at(self, t: np.ndarray) -> Motion:
+    def at(self, t: np.ndarray) -> BeadMotion:
         """At instants t (k,) >= 0 [s] after it was let go. At its end it stays, with
         the speed it came with."""
         i = np.clip(np.searchsorted(self.clock, t, side="right") - 1, 0, len(self.clock) - 2)
@@ -64,7 +64,7 @@ class Descent:
         chord = self.points[i + 1] - self.points[i]
         length = np.maximum(np.hypot(*chord.T), FLAT)[:, None]
         work = self.friction_work
-        return Motion(
+        return BeadMotion(
             self.points[i] + part * chord,
             chord / length,
             now,

@@ -26,7 +26,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.sparse import csc_array, diags_array
 
-from labs.problems.nonlinear_program import Derivatives, Values
+from labs.problems.nonlinear_program import ProgramDerivatives, ProgramValues
 from labs.resumable import Resumable
 
 EXPONENTS = {"even": 1, "clustered": 3}
@@ -75,18 +75,18 @@ class FastestPolyline:
         head = np.maximum(depth - self.mu * self.x[1:-1], 0.0)
         return np.clip(np.sqrt(2.0 * self.g * head), self.lower, self.upper)
 
-    def values(self, y: np.ndarray) -> Values:
+    def values(self, y: np.ndarray) -> ProgramValues:
         none = np.zeros(0)
         if not (np.isfinite(y).all() and (y > 0.0).all()):
-            return Values(np.inf, none, none)
+            return ProgramValues(np.inf, none, none)
         p, q, _ = self._segments(y)
-        return Values(MS * float(np.hypot(p, q).sum()), none, none)
+        return ProgramValues(MS * float(np.hypot(p, q).sum()), none, none)
 
-    def derivatives(self, y: np.ndarray) -> Derivatives:
+    def derivatives(self, y: np.ndarray) -> ProgramDerivatives:
         p, q, S = self._segments(y)
         t_v = _gradient(p, q, S, self.g, self.mu)[2]
         none = csc_array((0, len(y)))
-        return Derivatives(MS * (t_v[1:, 0] + t_v[:-1, 1]), none, none)
+        return ProgramDerivatives(MS * (t_v[1:, 0] + t_v[:-1, 1]), none, none)
 
     def hessian(
         self, y: np.ndarray, lam: np.ndarray, mu: np.ndarray, exact: bool

@@ -10,7 +10,7 @@ KEPT_CURVES, CURVE_POINTS = 8, 120
 
 
 @dataclass(frozen=True)
-class History:
+class DescentHistory:
     """The curve as it is now, and how it came about. Arrays are never written into again."""
 
     nodes: np.ndarray

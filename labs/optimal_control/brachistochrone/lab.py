@@ -7,11 +7,11 @@ from typing import ClassVar
 import numpy as np
 
 from labs.algorithms import sqp
-from labs.algorithms.sqp import Options
+from labs.algorithms.sqp import SqpOptions
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.optimal_control.brachistochrone.curves import straight
 from labs.optimal_control.brachistochrone.fastest_polyline import FastestPolyline, grid
-from labs.optimal_control.brachistochrone.history import History
+from labs.optimal_control.brachistochrone.history import DescentHistory
 from labs.optimal_control.brachistochrone.params import BrachistochroneParams
 from labs.optimal_control.brachistochrone.picture import draw_handles, draw_optimiser, draw_race
 from labs.optimal_control.brachistochrone.plots import (
@@ -21,11 +21,11 @@ from labs.optimal_control.brachistochrone.plots import (
     optimiser_fields,
     race_fields,
 )
-from labs.optimal_control.brachistochrone.race import CURVES, Race, nearest_part, race_of
+from labs.optimal_control.brachistochrone.race import CURVES, BeadRace, nearest_part, race_of
 from labs.params import Value
 from labs.scene import Scene
 
-OPTIONS = Options(hessian="gauss-newton", tolerance=1e-7, iterations=100)
+OPTIONS = SqpOptions(hessian="gauss-newton", tolerance=1e-7, iterations=100)
 """On each grid. This Hessian is the exact one wherever T is convex (`fastest_polyline`); the
 tolerance is of the gradient, in parts of the straight line's."""
 REST = 1.5
@@ -36,7 +36,7 @@ REST = 1.5
 class BrachistochroneState(State):
     """What the optimiser has, and for how long the beads have been sliding."""
 
-    history: History
+    history: DescentHistory
     steps: int = 0
     """World steps done: t = steps * period."""
     since: int = 0
@@ -193,12 +193,12 @@ class Brachistochrone(Lab[BrachistochroneParams, BrachistochroneState]):
 
     def _race(
         self, params: BrachistochroneParams, state: BrachistochroneState
-    ) -> tuple[Race, float]:
+    ) -> tuple[BeadRace, float]:
         """The race, and its time [s]."""
         return race_of(params, state.history.nodes), state.since * self.period
 
 
-def _gradient(problem: FastestPolyline, at: sqp.Iterate) -> float:
+def _gradient(problem: FastestPolyline, at: sqp.SqpIterate) -> float:
     """max |dT/dv| [ms/(m/s)], without what pushes against a bound."""
     return float(np.abs(problem.derivatives(at.y).f_y + at.nu).max())
 
@@ -216,14 +216,16 @@ def _problem(params: BrachistochroneParams, segments: int) -> FastestPolyline:
     return FastestPolyline(x, params.depth, params.g, params.mu, floor)
 
 
-def _first_guess(params: BrachistochroneParams, problem: FastestPolyline, v: np.ndarray) -> History:
+def _first_guess(
+    params: BrachistochroneParams, problem: FastestPolyline, v: np.ndarray
+) -> DescentHistory:
     """These speeds; where B is out of reach, a straight line without a time."""
     if not params.in_reach:
-        return History.start(straight(params.across, params.depth), np.inf, params.grids)
-    return History.start(problem.nodes(v), problem.values(v).f, params.grids)
+        return DescentHistory.start(straight(params.across, params.depth), np.inf, params.grids)
+    return DescentHistory.start(problem.nodes(v), problem.values(v).f, params.grids)
 
 
-def _start(problem: FastestPolyline, v: np.ndarray) -> sqp.Iterate:
+def _start(problem: FastestPolyline, v: np.ndarray) -> sqp.SqpIterate:
     """At these speeds. A gradient is small beside the straight line's, wherever one starts."""
     scale = float(np.abs(problem.derivatives(_straight(problem)).f_y).max())
     return replace(sqp.init(problem, v, OPTIONS), largest_gradient=scale)

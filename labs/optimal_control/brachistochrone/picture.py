@@ -8,9 +8,9 @@ import pinocchio as pin
 
 from labs.colors import sequential
 from labs.optimal_control.brachistochrone.curves import cycloid
-from labs.optimal_control.brachistochrone.history import KEPT_CURVES, History
+from labs.optimal_control.brachistochrone.history import KEPT_CURVES, DescentHistory
 from labs.optimal_control.brachistochrone.params import NO_FLOOR, BrachistochroneParams
-from labs.optimal_control.brachistochrone.race import BEADS, CURVES, YOURS, Race
+from labs.optimal_control.brachistochrone.race import BEADS, CURVES, YOURS, BeadRace
 from labs.scene import Scene
 from labs.shapes import Sphere, Vector3, Visual, primitive, translation
 
@@ -62,7 +62,7 @@ def _beads() -> Beads:
 
 
 def draw_race(
-    scene: Scene, params: BrachistochroneParams, race: Race, beads: np.ndarray, t: float
+    scene: Scene, params: BrachistochroneParams, race: BeadRace, beads: np.ndarray, t: float
 ) -> None:
     """The curves, and beads at (6, 2) [m] from A, t seconds after they were let go."""
     middle = 0.5 * (params.x_a + params.x_b), 0.5 * (params.z_a + params.z_b)
@@ -82,7 +82,7 @@ def draw_race(
             scene.label(f"of {name}", text, _label_place(params, race, i))
 
 
-def draw_handles(scene: Scene, params: BrachistochroneParams, race: Race) -> None:
+def draw_handles(scene: Scene, params: BrachistochroneParams, race: BeadRace) -> None:
     """What can be dragged, and the polygon of the control points."""
     ends_apart = params.across, params.depth
     ends = params.world_points(np.array([[0.0, 0.0], ends_apart]), BEHIND)
@@ -102,7 +102,7 @@ def draw_handles(scene: Scene, params: BrachistochroneParams, race: Race) -> Non
         scene.handle(f"control {k}", polygon[k], HANDLE_RADIUS)
 
 
-def draw_optimiser(scene: Scene, params: BrachistochroneParams, history: History) -> None:
+def draw_optimiser(scene: Scene, params: BrachistochroneParams, history: DescentHistory) -> None:
     """The curves of earlier iterations, fading, and the floor."""
     if params.race == "curves":
         for k, curve in enumerate(history.curves[:-1]):
@@ -115,7 +115,7 @@ def draw_optimiser(scene: Scene, params: BrachistochroneParams, history: History
         scene.trail("floor", params.world_points(ends, 0.5 * BEHIND), "warning")
 
 
-def _label_place(params: BrachistochroneParams, race: Race, i: int) -> np.ndarray:
+def _label_place(params: BrachistochroneParams, race: BeadRace, i: int) -> np.ndarray:
     """(3,) on its curve, or at its start where all share one."""
     point = race.starts[i]
     if params.race == "curves":
@@ -127,7 +127,7 @@ def _label_place(params: BrachistochroneParams, race: Race, i: int) -> np.ndarra
     return place
 
 
-def _ribbons(params: BrachistochroneParams, race: Race) -> tuple[np.ndarray, np.ndarray]:
+def _ribbons(params: BrachistochroneParams, race: BeadRace) -> tuple[np.ndarray, np.ndarray]:
     """Points and colours (2, k, 3) of one ribbon that goes along all curves, there and back."""
     paths = race.paths if params.race == "curves" else race.paths[:1]
     pieces = [_ribbon(params, path, i) for i, path in enumerate(paths)]

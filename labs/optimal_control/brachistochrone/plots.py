@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labs.optimal_control.brachistochrone.history import History
+from labs.optimal_control.brachistochrone.history import DescentHistory
 from labs.optimal_control.brachistochrone.params import BrachistochroneParams
-from labs.optimal_control.brachistochrone.race import BEADS, CURVES, STARTS, Race
+from labs.optimal_control.brachistochrone.race import BEADS, CURVES, STARTS, BeadRace
 from labs.plots import Bars, Curves, Line, Note, Plot, Readout, TimeSeries, Trace
 
 OF_CURVES, OF_STARTS = {"race": ("curves",)}, {"race": ("starts",)}
@@ -79,7 +79,7 @@ PLOTS: tuple[Plot, ...] = (
 )
 
 
-def race_fields(params: BrachistochroneParams, race: Race) -> dict[str, np.ndarray]:
+def race_fields(params: BrachistochroneParams, race: BeadRace) -> dict[str, np.ndarray]:
     """How far behind each is, and what is plotted along the ways."""
     behind = np.full(BEADS, np.nan)
     if np.isfinite(race.shortest):
@@ -94,7 +94,7 @@ def race_fields(params: BrachistochroneParams, race: Race) -> dict[str, np.ndarr
 
 
 def _snell_fields(
-    params: BrachistochroneParams, race: Race, x: np.ndarray, speed: np.ndarray
+    params: BrachistochroneParams, race: BeadRace, x: np.ndarray, speed: np.ndarray
 ) -> dict[str, np.ndarray]:
     """sin(alpha) / v, alpha being the angle to the plumb line (with friction, to the gravity that
     counts), in parts of the value that the fastest curve keeps all the way."""
@@ -108,7 +108,7 @@ def _snell_fields(
     return {"snell_x": x, "snell": np.minimum(law, SNELL_LIMIT)}
 
 
-def optimiser_fields(race: Race, history: History) -> dict[str, np.ndarray]:
+def optimiser_fields(race: BeadRace, history: DescentHistory) -> dict[str, np.ndarray]:
     """Iterations so far, and the error of each grid solved."""
     best = 1e3 * race.fastest.time if race.fastest else 0.0
     known = (history.solved > 0.0) & (best > 0.0)
@@ -126,7 +126,7 @@ def optimiser_fields(race: Race, history: History) -> dict[str, np.ndarray]:
     }
 
 
-def finish_note(params: BrachistochroneParams, race: Race, t: float) -> str:
+def finish_note(params: BrachistochroneParams, race: BeadRace, t: float) -> str:
     """Who has arrived t seconds after the start, in order, and who never will."""
     names = [TITLES[name] for name in CURVES]
     if params.race == "starts":

@@ -10,7 +10,7 @@ import numpy as np
 
 from labs.optimal_control.brachistochrone import curves
 from labs.optimal_control.brachistochrone.cycloid import FastestDescent, fastest_descent
-from labs.optimal_control.brachistochrone.descent import Descent, Motion, descend
+from labs.optimal_control.brachistochrone.descent import BeadMotion, Descent, descend
 from labs.optimal_control.brachistochrone.params import BrachistochroneParams
 
 CURVES = ("line", "knee", "circle", "cycloid", "yours", "optimised")
@@ -26,7 +26,7 @@ SAMPLES = 80
 
 
 @dataclass(frozen=True, eq=False)
-class Race:
+class BeadRace:
     """Six beads on their ways; coordinates are metres across and of depth from A."""
 
     paths: tuple[np.ndarray, ...]
@@ -67,25 +67,25 @@ class Race:
         """Of a bead that arrives, from 1; those within DEAD_HEAT share one."""
         return 1 + int((self.times < self.times[i] - DEAD_HEAT).sum())
 
-    def at(self, t: float) -> Motion:
+    def at(self, t: float) -> BeadMotion:
         """All six, t seconds after they were let go."""
         now = [descent.at(np.array([t])) for descent in self.descents]
-        return Motion(*(np.concatenate(rows) for rows in zip(*now, strict=True)))
+        return BeadMotion(*(np.concatenate(rows) for rows in zip(*now, strict=True)))
 
     @cached_property
-    def sampled(self) -> tuple[Motion, ...]:
+    def sampled(self) -> tuple[BeadMotion, ...]:
         """Each at SAMPLES instants of its own descent."""
         middle = (np.arange(SAMPLES) + 0.5) / SAMPLES
         return tuple(descent.at(middle * descent.clock[-1]) for descent in self.descents)
 
 
-def race_of(params: BrachistochroneParams, nodes: np.ndarray) -> Race:
+def race_of(params: BrachistochroneParams, nodes: np.ndarray) -> BeadRace:
     """With the optimiser's polyline `nodes` (N + 1, 2)."""
     return _race(params, nodes.tobytes())
 
 
 @lru_cache(maxsize=8)
-def _race(params: BrachistochroneParams, nodes: bytes) -> Race:
+def _race(params: BrachistochroneParams, nodes: bytes) -> BeadRace:
     across, depth = params.across, params.depth
     fastest = None
     if params.in_reach:
@@ -103,7 +103,7 @@ def _race(params: BrachistochroneParams, nodes: bytes) -> Race:
         paths = tuple(_to_bottom(params, part) for part in (*FROM_BOTTOM, params.release))
     descents = tuple(descend(path, params.g, params.mu) for path in paths)
     starts = np.array([path[0] for path in paths])
-    return Race(paths, descents, starts, paths[0][-1], fastest, params.race == "starts")
+    return BeadRace(paths, descents, starts, paths[0][-1], fastest, params.race == "starts")
 
 
 def _to_bottom(params: BrachistochroneParams, part: float) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from labs.algorithms import riccati, sqp
 from labs.algorithms.collocation import Collocation
-from labs.algorithms.sqp import Iterate, Variables
+from labs.algorithms.sqp import SqpIterate, Variables
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot
 from labs.optimal_control.collocation.params import CollocationParams
 from labs.optimal_control.collocation.plots import (
@@ -20,14 +20,19 @@ from labs.optimal_control.collocation.plots import (
     structure_fields,
     study_fields,
 )
-from labs.optimal_control.collocation.structure import Structure, structure_of
-from labs.optimal_control.collocation.studies import NO_STUDY, Study, study_order, study_sizes
+from labs.optimal_control.collocation.structure import SparsityPattern, structure_of
+from labs.optimal_control.collocation.studies import (
+    NO_STUDY,
+    ConvergenceStudy,
+    study_order,
+    study_sizes,
+)
 from labs.optimal_control.collocation.transcription import Costates, costates
 from labs.params import Value
 from labs.resumable import Resumable, run_to_completion
 from labs.scene import Scene
 from labs.tasks.direct.guesses import first_guess, start_guess, warm
-from labs.tasks.direct.history import History
+from labs.tasks.direct.history import IterationHistory
 from labs.tasks.direct.motions import collocated_motion
 from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots
 from labs.tasks.direct.plan_params import CHOICE_SETTINGS
@@ -52,9 +57,9 @@ class CollocationState(DirectState):
     """The motion with what its programme looks like."""
 
     variables: Variables
-    structure: Structure
+    structure: SparsityPattern
     costates: Costates
-    study: Study = NO_STUDY
+    study: ConvergenceStudy = NO_STUDY
 
 
 class CollocationLab(Lab[CollocationParams, CollocationState]):
@@ -93,7 +98,7 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
         return CollocationState(
             motion=motion,
             plan=plan,
-            history=History.start(params, at, motion),
+            history=IterationHistory.start(params, at, motion),
             playback=start_playback(plan),
             missed=np.zeros(0),
             variables=Variables(at.y, at.lam, at.mu, at.nu),
@@ -113,7 +118,7 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
             kept = replace(state, failed=True, reusable=False)
             yield Snapshot(1, _kept(kept, seconds), at.stopped)
             return
-        history = History.start(params, at, collocated_motion(program, at))
+        history = IterationHistory.start(params, at, collocated_motion(program, at))
         structure = state.structure if state.structure.variables == program.n else None
         while not at.stopped:
             at = yield from sqp.step_in_pieces(program, params.options, at)
@@ -214,7 +219,7 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
         riccati.prepare()
 
 
-def _start(params: CollocationParams, program: Collocation, state: CollocationState) -> Iterate:
+def _start(params: CollocationParams, program: Collocation, state: CollocationState) -> SqpIterate:
     """From the present solution, if there is one and it is wanted, with its multipliers if the grid
     is the same."""
     if warm(params, state.reusable) and len(state.variables.y) == program.n:
@@ -223,7 +228,7 @@ def _start(params: CollocationParams, program: Collocation, state: CollocationSt
     return sqp.init(program, program.variables(*guess), params.options)
 
 
-def _structure(program: Collocation, at: Iterate) -> Resumable[Structure]:
+def _structure(program: Collocation, at: SqpIterate) -> Resumable[SparsityPattern]:
     assert at.derivatives
     L_yy = yield from program.hessian(at.y, at.lam, at.mu, exact=True)
     return structure_of(at.derivatives.c_y, L_yy)

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from labs.algorithms.collocation_schemes import SCHEMES
-from labs.optimal_control.collocation.structure import Structure, edges, logarithms
-from labs.optimal_control.collocation.studies import Study, slopes
+from labs.optimal_control.collocation.structure import SparsityPattern, edges, logarithms
+from labs.optimal_control.collocation.studies import ConvergenceStudy, slopes
 from labs.optimal_control.collocation.transcription import Costates
 from labs.plots import Curves, HeatMap, Line, Plot, Readout, TimeSeries, Trace
-from labs.tasks.direct.history import History
+from labs.tasks.direct.history import IterationHistory
 from labs.tasks.direct.player import DirectState
 from labs.tasks.direct.plots import control_played, position_played
 from labs.tasks.motion.playback import FEEDBACK, OPEN_LOOP
@@ -154,7 +154,7 @@ PLOTS: tuple[Plot, ...] = (
 )
 
 
-def iteration_fields(history: History, T: float) -> dict[str, np.ndarray]:
+def iteration_fields(history: IterationHistory, T: float) -> dict[str, np.ndarray]:
     """Gaps over time now and before, and numbers of all iterations so far."""
     pieces, last = history.gaps.shape[1], history.iterations
     return {
@@ -199,7 +199,7 @@ def motion_fields(
     }
 
 
-def structure_fields(structure: Structure) -> dict[str, np.ndarray]:
+def structure_fields(structure: SparsityPattern) -> dict[str, np.ndarray]:
     """Both maps, with the numbers of rows and columns from 1."""
     rows, columns = structure.jacobian.shape
     return {
@@ -224,7 +224,9 @@ def costate_fields(found: Costates, joint: int) -> dict[str, np.ndarray]:
     }
 
 
-def study_fields(study: Study, seconds: Mapping[str, float | np.ndarray]) -> dict[str, np.ndarray]:
+def study_fields(
+    study: ConvergenceStudy, seconds: Mapping[str, float | np.ndarray]
+) -> dict[str, np.ndarray]:
     """Curves of what was measured besides; empty where it was not."""
     dense, sparse = (np.atleast_1d(seconds.get(way, np.zeros(0))) for way in ("dense", "sparse"))
     times = np.stack([dense, sparse], axis=1)

@@ -13,7 +13,7 @@ LEAST = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Structure:
+class SparsityPattern:
     """Of one programme. Arrays are never written into again."""
 
     jacobian: np.ndarray
@@ -36,10 +36,10 @@ class Structure:
         return self.hessian_nonzeros / self.variables**2
 
 
-def structure_of(c_y: csc_array, L_yy: csc_array) -> Structure:
+def structure_of(c_y: csc_array, L_yy: csc_array) -> SparsityPattern:
     """Of the Jacobian (m, n) and the Hessian (n, n), with their stored zeros."""
     m, n = c_y.shape
-    return Structure(_largest(c_y), _largest(L_yy), n, m, int(c_y.nnz), int(L_yy.nnz))
+    return SparsityPattern(_largest(c_y), _largest(L_yy), n, m, int(c_y.nnz), int(L_yy.nnz))
 
 
 def logarithms(sizes: np.ndarray) -> np.ndarray:

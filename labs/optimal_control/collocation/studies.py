@@ -11,12 +11,12 @@ from scipy.sparse.linalg import splu
 from labs.algorithms import sqp
 from labs.algorithms.collocation import Collocation
 from labs.algorithms.collocation_schemes import SCHEMES
-from labs.algorithms.sqp import Iterate, Options
+from labs.algorithms.sqp import SqpIterate, SqpOptions
 from labs.optimal_control.collocation.params import CollocationParams
 from labs.resumable import Resumable
 from labs.tasks.direct.guesses import resampled
 from labs.tasks.direct.motions import collocated_motion
-from labs.tasks.direct.trajectory import Trajectory
+from labs.tasks.direct.trajectory import PiecewiseTrajectory
 
 ORDER_STEPS = (10, 20, 40, 80)
 """N at which errors are measured."""
@@ -33,7 +33,7 @@ DAMPING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class ConvergenceStudy:
     """Plain data; what was not asked for has no rows."""
 
     steps: np.ndarray
@@ -58,10 +58,12 @@ class Study:
         return float(self.orders[list(SCHEMES).index(scheme)])
 
 
-NO_STUDY = Study(np.zeros(0), np.zeros((0, len(SCHEMES))), np.zeros(0), np.zeros((0, 2)))
+NO_STUDY = ConvergenceStudy(np.zeros(0), np.zeros((0, len(SCHEMES))), np.zeros(0), np.zeros((0, 2)))
 
 
-def study_order(params: CollocationParams, motion: Trajectory) -> Resumable[Study]:
+def study_order(
+    params: CollocationParams, motion: PiecewiseTrajectory
+) -> Resumable[ConvergenceStudy]:
     """From the present solution, all solved anew."""
     fine = yield from _solved(params, EXACT_STEPS, EXACT_RULE, motion)
     if not fine.converged:
@@ -73,12 +75,12 @@ def study_order(params: CollocationParams, motion: Trajectory) -> Resumable[Stud
             at = yield from _solved(params, N, scheme, exact)
             if at.converged:
                 errors[i, j] = abs(at.values.f - J) / abs(J or 1.0)
-    return Study(np.array(ORDER_STEPS, float), errors, NO_STUDY.sizes, NO_STUDY.entries)
+    return ConvergenceStudy(np.array(ORDER_STEPS, float), errors, NO_STUDY.sizes, NO_STUDY.entries)
 
 
 def study_sizes(
-    params: CollocationParams, motion: Trajectory, seconds: dict[str, float | np.ndarray]
-) -> Resumable[Study]:
+    params: CollocationParams, motion: PiecewiseTrajectory, seconds: dict[str, float | np.ndarray]
+) -> Resumable[ConvergenceStudy]:
     """Near the present solution. Leaves in `seconds` the times of a Newton step's linear system,
     "dense" and "sparse", (k,) [s]."""
     sizes: list[float] = []
@@ -102,7 +104,9 @@ def study_sizes(
         times.append(np.min(spent, axis=0))
     dense, sparse = np.transpose(times)
     seconds |= {"dense": dense, "sparse": sparse}
-    return Study(NO_STUDY.steps, NO_STUDY.errors, np.array(sizes), np.array(entries, float))
+    return ConvergenceStudy(
+        NO_STUDY.steps, NO_STUDY.errors, np.array(sizes), np.array(entries, float)
+    )
 
 
 def slopes(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -113,9 +117,9 @@ def slopes(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def _solved(
-    params: CollocationParams, N: int, scheme: str, motion: Trajectory
-) -> Resumable[Iterate]:
-    program, options = params.transcription(N, scheme), Options(tolerance=1e-10, iterations=60)
+    params: CollocationParams, N: int, scheme: str, motion: PiecewiseTrajectory
+) -> Resumable[SqpIterate]:
+    program, options = params.transcription(N, scheme), SqpOptions(tolerance=1e-10, iterations=60)
     at = sqp.init(program, _variables(params, program, motion), options)
     while not at.stopped:
         at = yield from sqp.step_in_pieces(program, options, at)
@@ -123,7 +127,9 @@ def _solved(
     return at
 
 
-def _variables(params: CollocationParams, program: Collocation, motion: Trajectory) -> np.ndarray:
+def _variables(
+    params: CollocationParams, program: Collocation, motion: PiecewiseTrajectory
+) -> np.ndarray:
     return program.variables(*resampled(params, motion, program.N))
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labs.algorithms.collocation import Collocation
-from labs.algorithms.sqp import Iterate
+from labs.algorithms.sqp import SqpIterate
 from labs.tasks.direct.motions import collocated_motion
 
 
@@ -23,7 +23,7 @@ class Costates:
     """(N + 1, nx)"""
 
 
-def costates(program: Collocation, at: Iterate) -> Costates:
+def costates(program: Collocation, at: SqpIterate) -> Costates:
     """The multipliers of an iterate whose derivatives are known, beside Pontryagin's costate along
     the same motion (notes, 2.1.3),
 

@@ -5,14 +5,14 @@ from typing import Self
 
 import numpy as np
 
-from labs.algorithms.ddp import Iterate
+from labs.algorithms.ddp import DdpIterate
 
 KEPT_PATHS, PATH_POINTS = 10, 60
 """Iterations whose paths are kept, and points of each."""
 
 
 @dataclass(frozen=True)
-class History:
+class DdpHistory:
     """Numbers of all iterations, and the paths of the last KEPT_PATHS, the newest last. Arrays are
     never written into again."""
 
@@ -30,7 +30,7 @@ class History:
     """(KEPT_PATHS, PATH_POINTS, 2) angle [rad] and velocity [rad/s] of a joint."""
 
     @classmethod
-    def start(cls, at: Iterate, tip: np.ndarray, phase: np.ndarray, before: Self | None) -> Self:
+    def start(cls, at: DdpIterate, tip: np.ndarray, phase: np.ndarray, before: Self | None) -> Self:
         """Of a first guess, with its paths (PATH_POINTS, 3) and (PATH_POINTS, 2). The last paths
         of what was solved `before` stay in view."""
         none = np.zeros(0)
@@ -41,7 +41,7 @@ class History:
             cost, none, none, none, none, none, _shift_in(rows[0], tip), _shift_in(rows[1], phase)
         )
 
-    def append(self, at: Iterate, tip: np.ndarray, phase: np.ndarray) -> Self:
+    def append(self, at: DdpIterate, tip: np.ndarray, phase: np.ndarray) -> Self:
         """One iteration later."""
         return type(self)(
             np.append(self.cost, at.cost),

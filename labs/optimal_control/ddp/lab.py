@@ -8,12 +8,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from labs.algorithms import ddp
-from labs.algorithms.ddp import Iterate
+from labs.algorithms.ddp import DdpIterate
 from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot
 from labs.models.coordinates import coordinate_labels
 from labs.models.mechanisms import mechanism
 from labs.optimal_control.ddp.disturbances import apply_impulse, sample_noise
-from labs.optimal_control.ddp.history import History, thin_out
+from labs.optimal_control.ddp.history import DdpHistory, thin_out
 from labs.optimal_control.ddp.params import DdpParams
 from labs.optimal_control.ddp.picture import draw_goal, draw_paths, draw_robots
 from labs.optimal_control.ddp.plots import (
@@ -31,7 +31,7 @@ from labs.tasks.motion.playback import (
     FEEDBACK,
     OPEN_LOOP,
     SUBSTEP,
-    Plan,
+    NominalTrajectory,
     advance_playback,
     start_playback,
 )
@@ -51,7 +51,7 @@ ARROW_STEPS = 30
 class DdpState(PlayerState):
     """The plan, how it was found, and how it is being played."""
 
-    history: History
+    history: DdpHistory
     paid: np.ndarray
     """(2,) cost of the last whole motion with feedback and in open loop; (0,) before it."""
     pushed: int = 0
@@ -101,10 +101,10 @@ class Ddp(Lab[DdpParams, DdpState]):
             X = np.tile(problem.x0, (problem.N + 1, 1))
             U = first_guess(problem, params.control_scale, 0.0, 0.0)
             at = replace(at, X=X, U=U, cost=problem.cost.value(X, U))
-        plan = Plan(at.X, at.U, at.K, params.h)
+        plan = NominalTrajectory(at.X, at.U, at.K, params.h)
         return DdpState(
             plan=plan,
-            history=History.start(at, *_paths(params, at), None),
+            history=DdpHistory.start(at, *_paths(params, at), None),
             playback=start_playback(plan),
             paid=np.zeros(0),
             missed=np.zeros(0),
@@ -120,13 +120,13 @@ class Ddp(Lab[DdpParams, DdpState]):
         if at.stopped:
             yield Snapshot(1, _snapshot_data(state.plan, state.history, True, {}), at.stopped)
             return
-        history = History.start(at, *_paths(params, at), state.history)
+        history = DdpHistory.start(at, *_paths(params, at), state.history)
         seconds = {phase: np.zeros(0) for phase in PHASES}
         while not at.stopped:
             at = yield from ddp.step_in_pieces(problem, params.options, at)
             history = history.append(at, *_paths(params, at))
             seconds = {name: np.append(seconds[name], at.seconds[name]) for name in PHASES}
-            plan = Plan(at.X, at.U, at.K, params.h)
+            plan = NominalTrajectory(at.X, at.U, at.K, params.h)
             failed = bool(at.stopped) and not at.converged
             yield Snapshot(at.iteration, _snapshot_data(plan, history, failed, seconds), at.stopped)
 
@@ -248,12 +248,12 @@ def _initial_controls(
 
 
 def _snapshot_data(
-    plan: Plan, history: History, failed: bool, seconds: Mapping[str, np.ndarray]
+    plan: NominalTrajectory, history: DdpHistory, failed: bool, seconds: Mapping[str, np.ndarray]
 ) -> dict[str, Any]:
     return {"plan": plan, "history": history, "failed": failed, "seconds": seconds}
 
 
-def _paths(params: DdpParams, at: Iterate) -> tuple[np.ndarray, np.ndarray]:
+def _paths(params: DdpParams, at: DdpIterate) -> tuple[np.ndarray, np.ndarray]:
     """Of the tip (PATH_POINTS, 3), and of the joint shown (PATH_POINTS, 2)."""
     system, joint = mechanism(params.system), params.motion.shown_joint
     X = thin_out(at.X)

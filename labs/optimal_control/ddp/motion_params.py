@@ -5,7 +5,7 @@ import numpy as np
 from labs.algorithms.integrators import INTEGRATORS
 from labs.params import Group, Params
 from labs.problems.optimal_control import OptimalControlProblem
-from labs.tasks.motion.motions import MOTIONS, Motion, MotionWeights, motion_problem
+from labs.tasks.motion.motions import MOTIONS, MotionTask, MotionWeights, motion_problem
 
 TIME_STEPS = {0.01: "10 ms", 0.02: "20 ms", 0.04: "40 ms"}
 
@@ -60,7 +60,7 @@ class MotionParams(Params):
     """Of the tip; or drag the ball in the scene."""
 
     @property
-    def motion(self) -> Motion:
+    def motion(self) -> MotionTask:
         return MOTIONS[self.system]
 
     @property

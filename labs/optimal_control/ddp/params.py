@@ -1,6 +1,6 @@
 """The tunables of the solver and of the world its plan meets."""
 
-from labs.algorithms.ddp import Options
+from labs.algorithms.ddp import DdpOptions
 from labs.optimal_control.ddp.motion_params import MotionParams
 from labs.params import Group
 
@@ -51,8 +51,8 @@ class DdpParams(MotionParams):
     """Impulse a push gives the tip of both robots, along y."""
 
     @property
-    def options(self) -> Options:
-        return Options(
+    def options(self) -> DdpOptions:
+        return DdpOptions(
             second_order=self.method == "ddp",
             c1=self.c1,
             c2=max(self.c1, self.c2),

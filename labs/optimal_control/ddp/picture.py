@@ -3,7 +3,7 @@
 import numpy as np
 
 from labs.models.mechanisms import mechanism
-from labs.optimal_control.ddp.history import KEPT_PATHS, History, thin_out
+from labs.optimal_control.ddp.history import KEPT_PATHS, DdpHistory, thin_out
 from labs.optimal_control.ddp.params import DdpParams
 from labs.scene import Scene
 from labs.tasks.motion.motions import tip_path
@@ -30,7 +30,7 @@ def draw_robots(scene: Scene, params: DdpParams, x: np.ndarray, u: np.ndarray) -
 
 
 def draw_paths(
-    scene: Scene, params: DdpParams, history: History, failed: bool, played: np.ndarray
+    scene: Scene, params: DdpParams, history: DdpHistory, failed: bool, played: np.ndarray
 ) -> None:
     """The path of the plan's tip, fading behind it those of earlier iterations, and that of the
     states played so far (k, nx)."""

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labs.optimal_control.ddp.history import History
+from labs.optimal_control.ddp.history import DdpHistory
 from labs.plots import Curves, Line, Plot, Readout, TimeSeries, Trace
-from labs.tasks.motion.playback import Plan
+from labs.tasks.motion.playback import NominalTrajectory
 
 PHASES = ("derivatives", "backward", "forward")
 """Of an iteration, that are timed."""
@@ -93,7 +93,7 @@ PLOTS: tuple[Plot, ...] = (
 
 
 def iteration_fields(
-    history: History, seconds: Mapping[str, float | np.ndarray]
+    history: DdpHistory, seconds: Mapping[str, float | np.ndarray]
 ) -> dict[str, np.ndarray]:
     """Numbers of all iterations so far, with the time [ms] each phase took."""
     spent = [np.atleast_1d(seconds.get(phase, np.zeros(0))) for phase in PHASES]
@@ -111,7 +111,7 @@ def iteration_fields(
     }
 
 
-def portrait_fields(history: History, played: np.ndarray, joint: int) -> dict[str, np.ndarray]:
+def portrait_fields(history: DdpHistory, played: np.ndarray, joint: int) -> dict[str, np.ndarray]:
     """Angle and velocity of a joint, in this iteration and in earlier ones, and as played so far:
     `played` (k, nx)."""
     angle, velocity = history.phase_paths[-1].T
@@ -126,7 +126,7 @@ def portrait_fields(history: History, played: np.ndarray, joint: int) -> dict[st
     }
 
 
-def plan_gain_fields(plan: Plan) -> dict[str, np.ndarray]:
+def plan_gain_fields(plan: NominalTrajectory) -> dict[str, np.ndarray]:
     """The gains of the first motor by angles and velocities of the first joints, two at most."""
     n = plan.X.shape[1] // 2
     shown = np.arange(min(n, 2))

@@ -20,7 +20,7 @@ from labs.optimal_control.direct_methods.plots import (
     plan_fields,
     race_readouts,
 )
-from labs.optimal_control.direct_methods.race import Race, lined_up, run_race, verdict
+from labs.optimal_control.direct_methods.race import Entrants, lined_up, run_race, verdict
 from labs.params import Value
 from labs.scene import Scene
 from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots
@@ -42,7 +42,7 @@ from labs.tasks.motion.player import PERIOD
 class DirectMethodsState(DirectState):
     """The race, and whose motion is being played."""
 
-    race: Race
+    race: Entrants
     played: str
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from labs.algorithms.collocation import Collocation
 from labs.algorithms.multiple_shooting import MultipleShooting
 from labs.algorithms.single_shooting import SingleShooting
-from labs.algorithms.sqp import Iterate
+from labs.algorithms.sqp import SqpIterate
 from labs.problems.continuous_control import ContinuousProblem
 from labs.problems.nonlinear_program import NonlinearProgram
 from labs.tasks.direct.guesses import Guess
@@ -18,7 +18,7 @@ from labs.tasks.direct.motions import (
     multiple_shooting_motion,
     single_shooting_motion,
 )
-from labs.tasks.direct.trajectory import Trajectory
+from labs.tasks.direct.trajectory import PiecewiseTrajectory
 
 TRANSCRIPTIONS: Mapping[str, str] = {
     "single": "Single shooting",
@@ -36,7 +36,7 @@ class Transcription:
     program: NonlinearProgram
     variables: Callable[[Guess], np.ndarray]
     """Of a first guess (n,): as much of it as the method takes."""
-    motion: Callable[[Iterate], Trajectory]
+    motion: Callable[[SqpIterate], PiecewiseTrajectory]
     """Of an iterate, in pieces that join where they are integrated in one go."""
     controls: np.ndarray
     """Which variables are controls (N, nu)."""

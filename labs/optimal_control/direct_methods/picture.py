@@ -10,7 +10,7 @@ import pinocchio as pin
 from labs.models.arms import Arm
 from labs.optimal_control.direct_methods.methods import TRANSCRIPTIONS
 from labs.optimal_control.direct_methods.params import DirectMethodsParams
-from labs.optimal_control.direct_methods.race import Entrant, Race
+from labs.optimal_control.direct_methods.race import Entrant, Entrants
 from labs.scene import Color, Scene
 from labs.shapes import Vector3, translation
 from labs.tasks.direct.history import drawn
@@ -31,7 +31,7 @@ BODIES: Mapping[str, Vector3] = {
 
 
 @dataclass(frozen=True)
-class Layout:
+class RowLayout:
     """Where things are [m]."""
 
     camera: tuple[Vector3, Vector3]
@@ -41,16 +41,16 @@ class Layout:
     """Where the name stands, by the robot's base; where all are in one place, above its tip."""
 
 
-LAYOUTS: Mapping[str, Layout] = {
-    "mass": Layout(((2.3, 0.5, 1.9), (-0.35, 0.3, 0.45)), 0.45, (0.0, -0.9, 0.72)),
-    "pendulum": Layout(((1.3, 0.75, 1.2), (-0.4, 0.0, 0.72)), 0.4, (0.0, 0.0, 0.12)),
-    "double-pendulum": Layout(((2.2, 1.1, 2.0), (-0.5, 0.0, 1.15)), 0.6, (0.0, 0.0, 0.1)),
-    "cart-pole": Layout(((2.2, 0.6, 2.0), (-0.45, 0.0, 0.6)), 0.6, (0.0, -1.0, 0.72)),
-    "ur5": Layout(system("ur5").camera, 0.0, (0.0, 0.0, 0.07)),
+LAYOUTS: Mapping[str, RowLayout] = {
+    "mass": RowLayout(((2.3, 0.5, 1.9), (-0.35, 0.3, 0.45)), 0.45, (0.0, -0.9, 0.72)),
+    "pendulum": RowLayout(((1.3, 0.75, 1.2), (-0.4, 0.0, 0.72)), 0.4, (0.0, 0.0, 0.12)),
+    "double-pendulum": RowLayout(((2.2, 1.1, 2.0), (-0.5, 0.0, 1.15)), 0.6, (0.0, 0.0, 0.1)),
+    "cart-pole": RowLayout(((2.2, 0.6, 2.0), (-0.45, 0.0, 0.6)), 0.6, (0.0, -1.0, 0.72)),
+    "ur5": RowLayout(system("ur5").camera, 0.0, (0.0, 0.0, 0.07)),
 }
 
 
-def draw_plans(scene: Scene, params: DirectMethodsParams, race: Race, clock: int) -> None:
+def draw_plans(scene: Scene, params: DirectMethodsParams, race: Entrants, clock: int) -> None:
     """Each at the same time of its own plan, with the path of its tip, parted where it does not
     join. Who has failed is a ghost."""
     layout = LAYOUTS[params.task.motion]

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from labs.optimal_control.direct_methods.methods import SHORT
-from labs.optimal_control.direct_methods.race import Race
+from labs.optimal_control.direct_methods.race import Entrants
 from labs.plots import Bars, Curves, Matrix, Note, Plot, Readout, Trace
 from labs.tasks.direct.plots import control_played, position_played
 
@@ -57,7 +57,7 @@ PLOTS: tuple[Plot, ...] = (
 )
 
 
-def race_readouts(race: Race) -> dict[str, float]:
+def race_readouts(race: Entrants) -> dict[str, float]:
     """Numbers of each method."""
     found = {}
     for name, at in race.items():
@@ -68,7 +68,7 @@ def race_readouts(race: Race) -> dict[str, float]:
     return found
 
 
-def iteration_fields(race: Race) -> dict[str, np.ndarray]:
+def iteration_fields(race: Entrants) -> dict[str, np.ndarray]:
     """Numbers of all iterations so far."""
     found = {}
     for name, at in race.items():
@@ -79,7 +79,7 @@ def iteration_fields(race: Race) -> dict[str, np.ndarray]:
     return found
 
 
-def plan_fields(race: Race, joint: int, u_0: np.ndarray) -> dict[str, np.ndarray]:
+def plan_fields(race: Entrants, joint: int, u_0: np.ndarray) -> dict[str, np.ndarray]:
     """The motions planned, of the joint that tells most, broken where they do not join; and the
     first control, in its unit."""
     found = {}
@@ -93,7 +93,7 @@ def plan_fields(race: Race, joint: int, u_0: np.ndarray) -> dict[str, np.ndarray
 
 
 def comparison_fields(
-    race: Race, seconds: Mapping[str, float | np.ndarray]
+    race: Entrants, seconds: Mapping[str, float | np.ndarray]
 ) -> dict[str, np.ndarray]:
     """What the programmes are like, a column or a bar for each method."""
     all_of = [at.structure for at in race.values()]

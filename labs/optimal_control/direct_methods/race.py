@@ -6,23 +6,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labs.algorithms import sqp
-from labs.algorithms.sqp import Iterate
+from labs.algorithms.sqp import SqpIterate
 from labs.optimal_control.direct_methods.methods import TRANSCRIPTIONS, Transcription, transcribe
 from labs.optimal_control.direct_methods.params import DirectMethodsParams
-from labs.optimal_control.direct_methods.structure import Structure, structure_of
+from labs.optimal_control.direct_methods.structure import ProgramStructure, structure_of
 from labs.resumable import Resumable, run_to_completion
 from labs.tasks.direct.guesses import Guess, first_guess, start_guess
-from labs.tasks.direct.history import History
-from labs.tasks.direct.trajectory import Trajectory
+from labs.tasks.direct.history import IterationHistory
+from labs.tasks.direct.trajectory import PiecewiseTrajectory
 
 
 @dataclass(frozen=True, eq=False)
 class Entrant:
     """How far one method is. Arrays are never written into again."""
 
-    motion: Trajectory
-    history: History
-    structure: Structure
+    motion: PiecewiseTrajectory
+    history: IterationHistory
+    structure: ProgramStructure
     stopped: str = ""
     """Why, in a sentence; empty while it goes on."""
     converged: bool = False
@@ -34,11 +34,11 @@ class Entrant:
         return bool(self.stopped) and not self.converged
 
 
-Race = Mapping[str, Entrant]
+Entrants = Mapping[str, Entrant]
 """By the keys of TRANSCRIPTIONS."""
 
 
-def lined_up(params: DirectMethodsParams) -> Race:
+def lined_up(params: DirectMethodsParams) -> Entrants:
     """Before the first iteration."""
     race = {}
     for name, method in _transcriptions(params).items():
@@ -50,12 +50,12 @@ def lined_up(params: DirectMethodsParams) -> Race:
 
 
 def run_race(
-    params: DirectMethodsParams, before: Race, seconds: dict[str, float]
-) -> Iterator[Race | None]:
+    params: DirectMethodsParams, before: Entrants, seconds: dict[str, float]
+) -> Iterator[Entrants | None]:
     """The race after each iteration of all that still go on; None within. `seconds` gets what an
     iteration of each took on average [s]."""
     methods = _transcriptions(params)
-    iterates, race = dict[str, Iterate](), dict[str, Entrant]()
+    iterates, race = dict[str, SqpIterate](), dict[str, Entrant]()
     total = dict.fromkeys(methods, 0.0)
     for name, method in methods.items():
         guess = start_guess(params, before[name].motion, before[name].reusable, params.N)
@@ -78,7 +78,7 @@ def run_race(
         yield dict(race)
 
 
-def verdict(race: Race) -> str:
+def verdict(race: Entrants) -> str:
     """How all of them ended, in a line."""
     if all(entrant.converged for entrant in race.values()):
         counts = [
@@ -101,7 +101,9 @@ def _transcriptions(params: DirectMethodsParams) -> Mapping[str, Transcription]:
     return transcribe(params.problem, params.N, params.m, params.M)
 
 
-def _entrant(params: DirectMethodsParams, method: Transcription, at: Iterate) -> Resumable[Entrant]:
+def _entrant(
+    params: DirectMethodsParams, method: Transcription, at: SqpIterate
+) -> Resumable[Entrant]:
     """At its first guess; at rest at the start where that diverges."""
     shown = at
     if not np.isfinite(at.values.f):
@@ -111,11 +113,11 @@ def _entrant(params: DirectMethodsParams, method: Transcription, at: Iterate) ->
         shown = sqp.init(method.program, y, params.options)
     motion = method.motion(shown)
     structure = yield from structure_of(method, shown, params.task.u_0, whole=False)
-    return Entrant(motion, History.start(params, shown, motion), structure, at.stopped)
+    return Entrant(motion, IterationHistory.start(params, shown, motion), structure, at.stopped)
 
 
 def _later(
-    params: DirectMethodsParams, method: Transcription, before: Entrant, at: Iterate
+    params: DirectMethodsParams, method: Transcription, before: Entrant, at: SqpIterate
 ) -> Resumable[Entrant]:
     """An iteration later; once it has stopped, with all that is told of its programme."""
     motion, structure = method.motion(at), before.structure

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import block_array, csc_array
 
-from labs.algorithms.sqp import Iterate
+from labs.algorithms.sqp import SqpIterate
 from labs.optimal_control.direct_methods.methods import Transcription
 from labs.resumable import Resumable
 
@@ -21,7 +21,7 @@ CHANGE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Structure:
+class ProgramStructure:
     """Of a programme with its present iterate."""
 
     variables: int
@@ -49,8 +49,8 @@ class Structure:
 
 
 def structure_of(
-    method: Transcription, at: Iterate, u_0: np.ndarray, whole: bool
-) -> Resumable[Structure]:
+    method: Transcription, at: SqpIterate, u_0: np.ndarray, whole: bool
+) -> Resumable[ProgramStructure]:
     """At an iterate that has a value; with condition and nonlinearity if it is to be whole."""
     program, y = method.program, at.y
     d = at.derivatives or program.derivatives(y)
@@ -58,7 +58,7 @@ def structure_of(
     yield
     sizes = (len(y), len(at.values.c) + len(at.values.g), d.c_y.nnz + d.g_y.nnz, L_yy.nnz)
     if not whole:
-        return Structure(*sizes)
+        return ProgramStructure(*sizes)
     condition = _condition(L_yy, d.c_y, method.controls, u_0)
     yield
     p = np.zeros(len(y))
@@ -67,7 +67,7 @@ def structure_of(
     change = program.values(y + p).c - at.values.c
     size = float(np.linalg.norm(foretold))
     missed = float(np.linalg.norm(change - foretold)) / size if size > 0.0 else 0.0
-    return Structure(*sizes, condition, missed if ROUNDING < missed < np.inf else 0.0)
+    return ProgramStructure(*sizes, condition, missed if ROUNDING < missed < np.inf else 0.0)
 
 
 def _condition(L_yy: csc_array, c_y: csc_array, controls: np.ndarray, u_0: np.ndarray) -> float:

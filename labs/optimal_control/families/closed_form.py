@@ -7,7 +7,7 @@ linear in (X, Y) with P = Y X^-1: (X, Y)' = [A, -B R^-1 B'; -Q, -A'] (X, Y).
 import numpy as np
 from scipy.linalg import expm
 
-from labs.optimal_control.families.motion import Motion, instants
+from labs.optimal_control.families.motion import MethodMotion, instants
 from labs.optimal_control.families.params import FamiliesParams
 
 
@@ -21,7 +21,7 @@ def riccati(params: FamiliesParams, to_go: np.ndarray) -> np.ndarray:
     return np.asarray(XY[:, 2:] @ np.linalg.inv(XY[:, :2]))
 
 
-def closed_form(params: FamiliesParams, x0: np.ndarray, T: float) -> Motion | None:
+def closed_form(params: FamiliesParams, x0: np.ndarray, T: float) -> MethodMotion | None:
     """The optimal motion of the mass from x0 (2,), if it meets no limit."""
     if params.system != "mass":
         return None
@@ -35,4 +35,4 @@ def closed_form(params: FamiliesParams, x0: np.ndarray, T: float) -> Motion | No
     U = -P[:, 1] / (2.0 * params.w_u * params.body.inertia)
     inside = np.abs(U).max() < params.u_max and not params.cost.excess(X[:, 0]).any()
     cost = float(x0 @ P_0 @ x0)
-    return Motion(t, X, U, P, cost, cost, known=True, converged=True) if inside else None
+    return MethodMotion(t, X, U, P, cost, cost, known=True, converged=True) if inside else None

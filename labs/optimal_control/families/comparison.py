@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from labs.optimal_control.families.motion import Motion
+from labs.optimal_control.families.motion import MethodMotion
 from labs.optimal_control.families.params import FamiliesParams
 
 TINY = 1e-12
@@ -18,7 +18,9 @@ def gap(curves: np.ndarray, others: np.ndarray, size: np.ndarray | None = None) 
     return float(100.0 * (np.abs(curves - others).max(axis=0) / np.maximum(size, TINY)).max())
 
 
-def tail_gaps(params: FamiliesParams, optimal: Motion, tail: Motion) -> Mapping[str, float]:
+def tail_gaps(
+    params: FamiliesParams, optimal: MethodMotion, tail: MethodMotion
+) -> Mapping[str, float]:
     """By how much a tail misses the optimal motion, and its cost what was left of J [%]."""
     rest = np.stack([np.interp(tail.t, optimal.t, column) for column in optimal.X.T], axis=1)
     left = optimal.cost - paid_until(params, optimal, float(tail.t[0]))
@@ -28,7 +30,7 @@ def tail_gaps(params: FamiliesParams, optimal: Motion, tail: Motion) -> Mapping[
     }
 
 
-def paid_until(params: FamiliesParams, motion: Motion, t: float) -> float:
+def paid_until(params: FamiliesParams, motion: MethodMotion, t: float) -> float:
     """int l dt from 0 to t [s], by cubics through the samples of l."""
     rate = params.cost.running(motion.X, motion.U[:, None])
     return float(CubicSpline(motion.t, rate).integrate(0.0, t))

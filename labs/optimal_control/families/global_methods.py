@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from labs.algorithms import backward_recursion, hjb
-from labs.algorithms.hjb import Grid, ValueFunction
+from labs.algorithms.hjb import StateGrid, ValueFunction
 from labs.algorithms.indirect import minimiser
 from labs.optimal_control.families.cost import SwingCost
-from labs.optimal_control.families.motion import Motion, no_motion
+from labs.optimal_control.families.motion import MethodMotion, no_motion
 from labs.optimal_control.families.params import FamiliesParams
 from labs.optimal_control.families.tables import integrate, nearest_node, tabulate
 from labs.problems.continuous_control import ContinuousProblem
@@ -35,10 +35,10 @@ LEVELS = 5
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class CostToGoTable:
     """Cost-to-go at the nodes and instants, and of dynamic programming the first controls."""
 
-    grid: Grid
+    grid: StateGrid
     T: float
     V: np.ndarray
     """(N + 1, n, n), from t = 0 to T."""
@@ -66,26 +66,26 @@ class Table:
         return np.array([V.gradient(x, at, 0.5 * reach) for x, at in zip(X, t, strict=True)])
 
 
-class Part(NamedTuple):
+class PartialTable(NamedTuple):
     """Of a table on its way: how far, V (n, n) there, and the table once it is complete."""
 
     progress: float
     V: np.ndarray
-    table: Table | None
+    table: CostToGoTable | None
 
 
-_kept: OrderedDict[Hashable, Table] = OrderedDict()
+_kept: OrderedDict[Hashable, CostToGoTable] = OrderedDict()
 
 
 @lru_cache(maxsize=8)
-def final_values(cost: SwingCost, grid: Grid) -> np.ndarray:
+def final_values(cost: SwingCost, grid: StateGrid) -> np.ndarray:
     """l_f at the nodes (n, n), not to be written into."""
     values = np.array([cost.final(x) for x in grid.nodes]).reshape(grid.shape)
     values.flags.writeable = False
     return values
 
 
-def make_table(params: FamiliesParams, method: str, nodes: int) -> Iterator[Part | None]:
+def make_table(params: FamiliesParams, method: str, nodes: int) -> Iterator[PartialTable | None]:
     """By "hjb" or "dp", in SHARES parts, the last with the table; None where it may pause within
     one."""
     numbers = (params.hjb_steps, 0.0) if method == "hjb" else (params.dp_steps, params.levels)
@@ -94,16 +94,18 @@ def make_table(params: FamiliesParams, method: str, nodes: int) -> Iterator[Part
     table = _kept.get(key)
     if table:
         for share in range(1, SHARES):
-            yield Part(share / SHARES, table.V[-1 - _done(len(table.V) - 1, share)], None)
+            yield PartialTable(share / SHARES, table.V[-1 - _done(len(table.V) - 1, share)], None)
     else:
         table = yield from {"hjb": _make_hjb, "dp": _make_dp}[method](params, nodes)
         _kept[key] = table
         while len(_kept) > 2 and sum(each.V.nbytes for each in _kept.values()) > KEPT:
             _kept.popitem(last=False)
-    yield Part(1.0, table.V[0], table)
+    yield PartialTable(1.0, table.V[0], table)
 
 
-def _make_hjb(params: FamiliesParams, nodes: int) -> Generator[Part | None, None, Table]:
+def _make_hjb(
+    params: FamiliesParams, nodes: int
+) -> Generator[PartialTable | None, None, CostToGoTable]:
     N, spent = round(params.hjb_steps), {"all": 0.0}
     problem, grid = params.problem(np.zeros(2), params.horizon), params.grid(nodes)
     V = np.empty((N + 1, *grid.shape))
@@ -116,11 +118,13 @@ def _make_hjb(params: FamiliesParams, nodes: int) -> Generator[Part | None, None
         for k in range(_done(N, share - 1), _done(N, share)):
             V[N - k - 1] = yield from timed(hjb.step(V[N - k], way, tried), spent, "all")
         if share < SHARES:
-            yield Part(share / SHARES, V[N - _done(N, share)], None)
-    return Table(grid, problem.T, V, spent["all"])
+            yield PartialTable(share / SHARES, V[N - _done(N, share)], None)
+    return CostToGoTable(grid, problem.T, V, spent["all"])
 
 
-def _make_dp(params: FamiliesParams, nodes: int) -> Generator[Part | None, None, Table]:
+def _make_dp(
+    params: FamiliesParams, nodes: int
+) -> Generator[PartialTable | None, None, CostToGoTable]:
     N, spent = round(params.dp_steps), {"all": 0.0}
     problem, grid = params.problem(np.zeros(2), params.horizon), params.grid(nodes)
     levels = hjb.controls(problem, round(params.levels))
@@ -135,8 +139,8 @@ def _make_dp(params: FamiliesParams, nodes: int) -> Generator[Part | None, None,
             V[N - k - 1], policy[N - k - 1] = stage.V.reshape(grid.shape), stage.policy
         spent["all"] += perf_counter() - begun
         if share < SHARES:
-            yield Part(share / SHARES, V[N - _done(N, share)], None)
-    return Table(grid, problem.T, V, spent["all"], policy)
+            yield PartialTable(share / SHARES, V[N - _done(N, share)], None)
+    return CostToGoTable(grid, problem.T, V, spent["all"], policy)
 
 
 def _done(N: int, share: int) -> int:
@@ -147,7 +151,7 @@ def _done(N: int, share: int) -> int:
 # Motions --------------------------------------------------------------------------------------
 
 
-def follow_gradient(problem: ContinuousProblem, table: Table) -> Resumable[Motion]:
+def follow_gradient(problem: ContinuousProblem, table: CostToGoTable) -> Resumable[MethodMotion]:
     """From x_0 under u = argmin of H(x, u, V_x(x, t)), held from one sample to the next."""
     motion = no_motion(problem)
     t, X, U, P = motion.t, motion.X.copy(), motion.U.copy(), motion.P.copy()
@@ -176,7 +180,9 @@ def follow_gradient(problem: ContinuousProblem, table: Table) -> Resumable[Motio
     )
 
 
-def follow_table(problem: ContinuousProblem, table: Table, levels: np.ndarray) -> Resumable[Motion]:
+def follow_table(
+    problem: ContinuousProblem, table: CostToGoTable, levels: np.ndarray
+) -> Resumable[MethodMotion]:
     """From x_0 under the control that the table has at the nearest node, held for a step."""
     assert table.policy is not None
     motion, N = no_motion(problem), len(table.policy)

@@ -8,7 +8,7 @@ import numpy as np
 from labs.algorithms import indirect, indirect_shooting, sqp
 from labs.algorithms.collocation import Collocation
 from labs.algorithms.indirect import Extremal
-from labs.optimal_control.families.motion import Motion, no_motion
+from labs.optimal_control.families.motion import MethodMotion, no_motion
 from labs.problems.continuous_control import ContinuousProblem
 from labs.resumable import Resumable
 
@@ -16,12 +16,12 @@ TOLERANCE = 1e-6
 """Of Pontryagin's differential equations."""
 MESH = 61
 """Nodes of the first mesh."""
-OPTIONS = sqp.Options(hessian="exact", tolerance=1e-6, iterations=100)
+OPTIONS = sqp.SqpOptions(hessian="exact", tolerance=1e-6, iterations=100)
 
 
 def apply_pontryagin(
-    problem: ContinuousProblem, guess: Motion, method: str, tolerance: float = TOLERANCE
-) -> Resumable[Motion]:
+    problem: ContinuousProblem, guess: MethodMotion, method: str, tolerance: float = TOLERANCE
+) -> Resumable[MethodMotion]:
     """By "collocation" or "shooting", from the states and costates of a motion."""
     some = np.round(np.linspace(0, len(guess.t) - 1, MESH)).astype(int)
     if method == "shooting":
@@ -32,7 +32,7 @@ def apply_pontryagin(
     return motion_of_extremal(problem, found)
 
 
-def motion_of_extremal(problem: ContinuousProblem, found: Extremal) -> Motion:
+def motion_of_extremal(problem: ContinuousProblem, found: Extremal) -> MethodMotion:
     """Without a motion where nothing was found: half-solved equations are none."""
     motion = no_motion(problem)
     if not found.converged:
@@ -52,7 +52,9 @@ def motion_of_extremal(problem: ContinuousProblem, found: Extremal) -> Motion:
     )
 
 
-def optimise_directly(problem: ContinuousProblem, guess: Motion, N: int) -> Iterator[Motion | None]:
+def optimise_directly(
+    problem: ContinuousProblem, guess: MethodMotion, N: int
+) -> Iterator[MethodMotion | None]:
     """By trapezoidal collocation in N steps, from the states and controls of a motion: after each
     iteration of SQP; None where it may pause within one."""
     program = Collocation(problem, N, "trapezoidal")
@@ -67,7 +69,9 @@ def optimise_directly(problem: ContinuousProblem, guess: Motion, N: int) -> Iter
         yield motion_of_iterate(problem, program, at)
 
 
-def motion_of_iterate(problem: ContinuousProblem, program: Collocation, at: sqp.Iterate) -> Motion:
+def motion_of_iterate(
+    problem: ContinuousProblem, program: Collocation, at: sqp.SqpIterate
+) -> MethodMotion:
     """Its multipliers, one for each step, are the costates in the middle of the step, with the
     other sign; that of x(0) = x_0 is the costate at the start, and l_f,x that at the end."""
     motion, N = no_motion(problem), program.N

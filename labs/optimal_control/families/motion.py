@@ -11,7 +11,7 @@ SAMPLES = 150
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class MethodMotion:
     """A method's motion, if it has found one."""
 
     t: np.ndarray
@@ -48,19 +48,19 @@ def instants(T: float, start: float = 0.0) -> np.ndarray:
     return start + np.linspace(0.0, T, SAMPLES + 1)
 
 
-def no_motion(problem: ContinuousProblem) -> Motion:
+def no_motion(problem: ContinuousProblem) -> MethodMotion:
     """Before anything is found: at rest in x_0."""
     still = np.zeros(SAMPLES + 1)
     X = np.tile(problem.x0, (SAMPLES + 1, 1))
-    return Motion(instants(problem.T), X, still, np.zeros_like(X))
+    return MethodMotion(instants(problem.T), X, still, np.zeros_like(X))
 
 
-def resample(motion: Motion, T: float) -> Motion:
+def resample(motion: MethodMotion, T: float) -> MethodMotion:
     """The same, stretched to T [s]."""
     return replace(motion, t=instants(T))
 
 
-def first_guess(problem: ContinuousProblem, swing: float) -> Motion:
+def first_guess(problem: ContinuousProblem, swing: float) -> MethodMotion:
     """From q_0 to 0 and to rest, and on the way out by about `swing` and back; the control that
     this takes, within its limits, and the costates for which that control would minimise H."""
     t = instants(problem.T)
@@ -76,4 +76,4 @@ def first_guess(problem: ContinuousProblem, swing: float) -> Motion:
     cost = problem.cost.running_derivatives(X, U[:, None], exact=True)
     p_v = -cost.l_u[:, 0] / gain
     p_q = -np.gradient(p_v, t, edge_order=2) - cost.l_x[:, 1]
-    return Motion(t, X, U, np.stack([p_q, p_v], axis=1), known=True)
+    return MethodMotion(t, X, U, np.stack([p_q, p_v], axis=1), known=True)

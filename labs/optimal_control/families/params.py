@@ -4,14 +4,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labs.algorithms.hjb import Grid
+from labs.algorithms.hjb import StateGrid
 from labs.optimal_control.families.cost import SwingCost
-from labs.optimal_control.families.systems import BLOCK_ON_A_LINE, PENDULUM, Body
+from labs.optimal_control.families.systems import BLOCK_ON_A_LINE, PENDULUM, UprightBody
 from labs.params import Group, Params
 from labs.problems.continuous_control import ContinuousProblem
 
 SYSTEMS = {"pendulum": "Pendulum", "mass": "Mass on a line"}
-BODIES: Mapping[str, Body] = {"pendulum": PENDULUM, "mass": BLOCK_ON_A_LINE}
+BODIES: Mapping[str, UprightBody] = {"pendulum": PENDULUM, "mass": BLOCK_ON_A_LINE}
 WINDOWS: Mapping[str, tuple[tuple[float, float], tuple[float, float]]] = {
     "pendulum": ((-1.5, -11.0), (5.0, 11.0)),
     "mass": ((-1.6, -4.0), (1.6, 4.0)),
@@ -128,7 +128,7 @@ class FamiliesParams(Params):
     """What is solved besides: other grids, or other first guesses."""
 
     @property
-    def body(self) -> Body:
+    def body(self) -> UprightBody:
         return BODIES[self.system]
 
     @property
@@ -145,6 +145,6 @@ class FamiliesParams(Params):
         bound, none = np.array([self.u_max]), np.full(2, np.inf)
         return ContinuousProblem(self.body, self.cost, x0, T, -none, none, -bound, bound)
 
-    def grid(self, nodes: int) -> Grid:
+    def grid(self, nodes: int) -> StateGrid:
         """With so many nodes along each axis."""
-        return Grid(*WINDOWS[self.system], (nodes, nodes))
+        return StateGrid(*WINDOWS[self.system], (nodes, nodes))

@@ -14,7 +14,7 @@ import numpy as np
 from labs.colors import sequential
 from labs.models.mass_on_a_line import mass_on_a_line
 from labs.models.pendulums import hanging
-from labs.optimal_control.families.motion import Motion
+from labs.optimal_control.families.motion import MethodMotion
 from labs.optimal_control.families.params import FamiliesParams
 from labs.optimal_control.families.side_by_side import FAMILY_NAMES, Results
 from labs.scene import Color, Scene
@@ -39,7 +39,7 @@ ABOVE = np.array([0.0, 0.0, 0.03])
 
 
 @dataclass(frozen=True)
-class Layout:
+class PanelLayout:
     """Where things are [m]."""
 
     camera: tuple[Vector3, Vector3]
@@ -56,8 +56,8 @@ class Layout:
     spacing: float
 
 
-LAYOUTS: Mapping[str, Layout] = {
-    "pendulum": Layout(
+LAYOUTS: Mapping[str, PanelLayout] = {
+    "pendulum": PanelLayout(
         ((1.55, 0.5, 1.75), (0.0, -0.1, 0.62)),
         ((-1.5, -6.6), (5.0, 6.6)),
         (1.6, 1.25),
@@ -66,7 +66,7 @@ LAYOUTS: Mapping[str, Layout] = {
         0.35,
         0.3,
     ),
-    "mass": Layout(
+    "mass": PanelLayout(
         ((2.6, 0.0, 2.0), (-0.75, 0.0, 0.3)),
         ((-1.6, -4.0), (1.6, 4.0)),
         (3.2, 1.7),
@@ -159,7 +159,7 @@ def draw_values(scene: Scene, params: FamiliesParams, at: Results, now: float) -
     _draw_tail(scene, surface, at.tail if params.moment else None)
 
 
-def _draw_tail(scene: Scene, surface: Surface, tail: Motion | None) -> None:
+def _draw_tail(scene: Scene, surface: Surface, tail: MethodMotion | None) -> None:
     if tail and tail.converged:
         path = surface.lift(tail.X) + ABOVE
         scene.trail("tail", path, "warning")

@@ -13,17 +13,17 @@ from labs.algorithms import hjb
 from labs.optimal_control.families.closed_form import closed_form
 from labs.optimal_control.families.comparison import gap, tail_gaps
 from labs.optimal_control.families.global_methods import (
-    Part,
-    Table,
+    CostToGoTable,
+    PartialTable,
     final_values,
     follow_gradient,
     follow_table,
     make_table,
 )
 from labs.optimal_control.families.local_methods import apply_pontryagin, optimise_directly
-from labs.optimal_control.families.motion import Motion, first_guess, no_motion, resample
+from labs.optimal_control.families.motion import MethodMotion, first_guess, no_motion, resample
 from labs.optimal_control.families.params import FamiliesParams
-from labs.optimal_control.families.study import Study, no_study, run_study
+from labs.optimal_control.families.study import MethodComparison, no_study, run_study
 from labs.resumable import Resumable, timed
 
 FAMILY_NAMES = {"hjb": "HJB", "dp": "DP", "pontryagin": "Pontryagin", "direct": "Direct"}
@@ -40,7 +40,7 @@ SWINGS = (0.0, 1.0)
 class Results:
     """How far the four have come. Plain data; its arrays are never written into."""
 
-    motions: Mapping[str, Motion]
+    motions: Mapping[str, MethodMotion]
     """By method."""
     progress: Mapping[str, float]
     """By method, in [0, 1]."""
@@ -48,9 +48,9 @@ class Results:
     """V (n, n) of the two tables: on the way the latest, then that of the moment M."""
     gradients: Mapping[str, np.ndarray]
     """(SAMPLES + 1, 2) of V of the two tables along the optimal motion; else zeros."""
-    tail: Motion
+    tail: MethodMotion
     """The motion from the optimal one's state at M on, solved for once more."""
-    study: Study
+    study: MethodComparison
     gaps: Mapping[str, float]
     """How close the answers are [%]: of V's gradient and of the multipliers to the costate, of the
     tail to the motion and of its cost to the rest of J; UNKNOWN, where they are."""
@@ -73,7 +73,7 @@ def no_results(params: FamiliesParams) -> Results:
     )
 
 
-def reference(params: FamiliesParams, motions: Mapping[str, Motion]) -> Motion | None:
+def reference(params: FamiliesParams, motions: Mapping[str, MethodMotion]) -> MethodMotion | None:
     """The optimal motion to measure by: in closed form, or the cheaper of what the local methods
     have converged to, Pontryagin's where they agree."""
     exact = closed_form(params, params.x0, params.horizon)
@@ -87,21 +87,21 @@ def reference(params: FamiliesParams, motions: Mapping[str, Motion]) -> Motion |
 
 
 def solve_side_by_side(
-    params: FamiliesParams, before: Mapping[str, Motion], seconds: dict[str, float]
+    params: FamiliesParams, before: Mapping[str, MethodMotion], seconds: dict[str, float]
 ) -> Iterator[Results | None]:
     """Round by round, from the motions `before` where the start is warm; None within a round. Adds
     up in `seconds` what each method takes, that of a table being what it took to make it."""
     at = no_results(params)
     problem = params.problem(params.x0, params.horizon)
     guess = first_guess(problem, params.guess)
-    tables: dict[str, Table] = {}
+    tables: dict[str, CostToGoTable] = {}
 
-    def start(name: str) -> Motion:
+    def start(name: str) -> MethodMotion:
         warm = params.start == "warm" and before[name].converged
         return resample(before[name], params.horizon) if warm else guess
 
     nodes = round(params.nodes)
-    work: dict[str, Iterator[Part | Motion | None]] = {
+    work: dict[str, Iterator[PartialTable | MethodMotion | None]] = {
         "hjb": make_table(params, "hjb", nodes),
         "dp": make_table(params, "dp", nodes),
         "pontryagin": _pontryagin(params, start("pontryagin")),
@@ -120,9 +120,9 @@ def solve_side_by_side(
             if share == "end":
                 del work[name]
                 at = _with(at, "progress", name, 1.0)
-            elif isinstance(share, Motion):
+            elif isinstance(share, MethodMotion):
                 at = _with(at, "motions", name, share)
-            elif isinstance(share, Part):
+            elif isinstance(share, PartialTable):
                 at = _with(_with(at, "values", name, share.V), "progress", name, share.progress)
                 if share.table:
                     tables[name] = share.table
@@ -156,7 +156,7 @@ def _with(at: Results, field: str, name: str, value: object) -> Results:
     return replace(at, **changed)
 
 
-def _gaps(params: FamiliesParams, at: Results, optimal: Motion) -> dict[str, float]:
+def _gaps(params: FamiliesParams, at: Results, optimal: MethodMotion) -> dict[str, float]:
     found = {"gradient_gap": gap(at.gradients["hjb"], optimal.P)}
     direct = at.motions["direct"]
     if direct.converged and direct is not optimal:
@@ -166,19 +166,19 @@ def _gaps(params: FamiliesParams, at: Results, optimal: Motion) -> dict[str, flo
     return found
 
 
-def _pontryagin(params: FamiliesParams, guess: Motion) -> Iterator[Motion | None]:
+def _pontryagin(params: FamiliesParams, guess: MethodMotion) -> Iterator[MethodMotion | None]:
     problem = params.problem(params.x0, params.horizon)
     yield (yield from apply_pontryagin(problem, guess, params.pontryagin))
 
 
-def _follow(params: FamiliesParams, name: str, table: Table) -> Resumable[Motion]:
+def _follow(params: FamiliesParams, name: str, table: CostToGoTable) -> Resumable[MethodMotion]:
     problem = params.problem(params.x0, params.horizon)
     if name == "hjb":
         return follow_gradient(problem, table)
     return follow_table(problem, table, hjb.controls(problem, round(params.levels)))
 
 
-def _solve_tail(params: FamiliesParams, optimal: Motion) -> Resumable[Motion]:
+def _solve_tail(params: FamiliesParams, optimal: MethodMotion) -> Resumable[MethodMotion]:
     """From the optimal motion's state at M, as a problem of its own: the cheapest motion that some
     first guesses of its own lead to. None for M = 0, which is the whole."""
     begin = params.moment * params.horizon

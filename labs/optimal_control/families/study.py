@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labs.optimal_control.families.global_methods import Table, make_table
+from labs.optimal_control.families.global_methods import CostToGoTable, make_table
 from labs.optimal_control.families.local_methods import apply_pontryagin, optimise_directly
-from labs.optimal_control.families.motion import Motion, first_guess
+from labs.optimal_control.families.motion import MethodMotion, first_guess
 from labs.optimal_control.families.params import FamiliesParams
 from labs.optimal_control.families.tables import nearest_node
 from labs.resumable import Resumable
@@ -20,7 +20,7 @@ ROUGH = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class MethodComparison:
     """A result of two methods at places of the x axis."""
 
     x: np.ndarray
@@ -37,13 +37,13 @@ class Study:
         return self.count / len(NODES if study == "grid" else SWINGS)
 
 
-def no_study() -> Study:
+def no_study() -> MethodComparison:
     """Before the first result."""
     shape = (len(SWINGS), 2)
-    return Study(np.zeros(shape[0]), np.zeros(shape), np.zeros(shape, bool))
+    return MethodComparison(np.zeros(shape[0]), np.zeros(shape), np.zeros(shape, bool))
 
 
-def run_study(params: FamiliesParams, optimal: Motion) -> Iterator[Study | None]:
+def run_study(params: FamiliesParams, optimal: MethodMotion) -> Iterator[MethodComparison | None]:
     """The one that is wanted, a point further each time; None in the midst of one. Errors are
     counted from the cost of the `optimal` motion."""
     at = no_study()
@@ -59,16 +59,20 @@ def run_study(params: FamiliesParams, optimal: Motion) -> Iterator[Study | None]
             yield at
 
 
-def _with(at: Study, i: int, x: float, y: np.ndarray, found: np.ndarray) -> Study:
+def _with(
+    at: MethodComparison, i: int, x: float, y: np.ndarray, found: np.ndarray
+) -> MethodComparison:
     new = replace(at, x=at.x.copy(), y=at.y.copy(), found=at.found.copy(), count=i + 1)
     new.x[i], new.y[i], new.found[i] = x, y, found
     return new
 
 
-def _errors_of_grids(params: FamiliesParams, nodes: int, optimal: Motion) -> Resumable[np.ndarray]:
+def _errors_of_grids(
+    params: FamiliesParams, nodes: int, optimal: MethodMotion
+) -> Resumable[np.ndarray]:
     promised = []
     for method in ("hjb", "dp"):
-        table: Table | None = None
+        table: CostToGoTable | None = None
         for part in make_table(params, method, nodes):
             yield None
             table = part.table if part else table
@@ -77,7 +81,7 @@ def _errors_of_grids(params: FamiliesParams, nodes: int, optimal: Motion) -> Res
     return np.abs(np.array(promised) - optimal.cost)
 
 
-def value_at(table: Table, x: np.ndarray) -> float:
+def value_at(table: CostToGoTable, x: np.ndarray) -> float:
     """V(x, 0) of a table: of dynamic programming at the nearest node."""
     if table.policy is None:
         return table.function.value(x, 0.0)

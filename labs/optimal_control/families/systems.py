@@ -20,7 +20,7 @@ TORQUE_LEVEL = MASS * GRAVITY * LENGTH / 2.0
 
 
 @dataclass(frozen=True)
-class Body:
+class UprightBody:
     """q'' = stiffness sin(q) + u / inertia. All points at once: X (k, 2), U (k, 1)."""
 
     inertia: float
@@ -48,5 +48,5 @@ class Body:
         return f, f_x, f_u
 
 
-PENDULUM = Body(INERTIA, TORQUE_LEVEL / INERTIA)
-BLOCK_ON_A_LINE = Body(BLOCK, 0.0)
+PENDULUM = UprightBody(INERTIA, TORQUE_LEVEL / INERTIA)
+BLOCK_ON_A_LINE = UprightBody(BLOCK, 0.0)

@@ -7,7 +7,7 @@ the nearest node, or where it leaves the grid, to the nearest at its edge.
 
 import numpy as np
 
-from labs.algorithms.hjb import Grid
+from labs.algorithms.hjb import StateGrid
 from labs.problems.continuous_control import ContinuousProblem
 from labs.problems.finite_mdp import FiniteMDP
 from labs.resumable import Resumable
@@ -38,7 +38,7 @@ def integrate(
     return X, cost
 
 
-def nearest_node(grid: Grid, X: np.ndarray) -> np.ndarray:
+def nearest_node(grid: StateGrid, X: np.ndarray) -> np.ndarray:
     """(k,) numbers of the nodes nearest to X (k, 2)."""
     places = np.rint(grid.cells(X)).astype(np.int64)
     i, j = (np.clip(places[:, k], 0, grid.shape[k] - 1) for k in (0, 1))
@@ -46,7 +46,7 @@ def nearest_node(grid: Grid, X: np.ndarray) -> np.ndarray:
 
 
 def tabulate(
-    problem: ContinuousProblem, grid: Grid, dt: float, levels: np.ndarray
+    problem: ContinuousProblem, grid: StateGrid, dt: float, levels: np.ndarray
 ) -> Resumable[FiniteMDP]:
     """The MDP of steps of dt and these controls (U,). Pauses after each of them."""
     columns = []

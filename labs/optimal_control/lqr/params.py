@@ -7,7 +7,7 @@ from pydantic_core.core_schema import ValidationInfo
 from labs.errors import LabError
 from labs.optimal_control.lqr.linear_systems import LINEAR_SYSTEMS, LinearSystem
 from labs.optimal_control.lqr.own_system import EXAMPLE, OwnSystem, own_system
-from labs.optimal_control.lqr.region_of_attraction import ClosedLoop
+from labs.optimal_control.lqr.region_of_attraction import RegulatedSystem
 from labs.optimal_control.lqr.regulator import (
     FINAL_WEIGHTS,
     LQR_POLICIES,
@@ -159,7 +159,7 @@ class LqrParams(Params):
         return np.full(system.nu, self.limit)
 
     @property
-    def closed_loop(self) -> ClosedLoop:
+    def closed_loop(self) -> RegulatedSystem:
         """The loop whose region of attraction is sought; not for the UR5."""
         limit = self.limit if self.limits else np.inf
-        return ClosedLoop(self.system, self.period, self.regulator.gains[:, 0], limit)
+        return RegulatedSystem(self.system, self.period, self.regulator.gains[:, 0], limit)

@@ -42,7 +42,7 @@ SYSTEM_CODES: Mapping[str, int] = {"mass": 0, "pendulum": 1, "cart-pole": 2}
 
 
 @dataclass(frozen=True, eq=False)
-class ClosedLoop:
+class RegulatedSystem:
     """A system under a linear policy."""
 
     system: str

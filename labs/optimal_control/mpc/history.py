@@ -14,7 +14,7 @@ FAN, STRIDE = 8, 0.08
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class PlannedMotion:
     """What a plan says: X (N + 1, nx) from the time t [s] on, in steps of h [s]."""
 
     t: float
@@ -33,15 +33,15 @@ class Prediction:
 
 
 @dataclass(frozen=True, eq=False)
-class History:
+class PlanningHistory:
     """Arrays are never written into again."""
 
     past: np.ndarray
     """(up to PAST, nx) the states of the last world steps, the present one last."""
-    fan: tuple[Prediction, ...] = ()
+    fan: tuple[PlannedMotion, ...] = ()
     """Earlier predictions, the oldest first."""
-    latest: Prediction | None = None
-    first: Prediction | None = None
+    latest: PlannedMotion | None = None
+    first: PlannedMotion | None = None
     promised: float | None = None
     """What the first plan was to cost."""
     paid: float = 0.0
@@ -57,7 +57,7 @@ class History:
 
     def planned(self, plan: Plan, t: float, h: float) -> Self:
         """With a new plan, which begins at t."""
-        now, fan = Prediction(t, h, plan.X), self.fan
+        now, fan = PlannedMotion(t, h, plan.X), self.fan
         if self.latest and (not fan or self.latest.t - fan[-1].t > STRIDE - 0.5 * h):
             fan = (*fan, self.latest)[-FAN:]
         if self.first is None:

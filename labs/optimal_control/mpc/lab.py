@@ -13,7 +13,7 @@ from labs.lab import Action, Handle, Inputs, Lab, Measurement, State
 from labs.models.coordinates import coordinate_labels
 from labs.models.mechanisms import mechanism
 from labs.optimal_control.mpc.controller import control, cost_terms, planner_of
-from labs.optimal_control.mpc.history import History
+from labs.optimal_control.mpc.history import PlanningHistory
 from labs.optimal_control.mpc.params import MpcParams
 from labs.optimal_control.mpc.picture import draw_goal, draw_limits, draw_predictions, draw_robot
 from labs.optimal_control.mpc.plots import (
@@ -60,7 +60,7 @@ class MpcState(State):
     """By how much the last plan exceeds soft limits."""
     gap: float | None = None
     iterations: int = 0
-    history: History
+    history: PlanningHistory
     pushed: int = 0
     """World steps the arrow of a push still stays."""
     clock: int = 0
@@ -99,7 +99,7 @@ class Mpc(Lab[MpcParams, MpcState]):
             base=at.x0,
             aim=params.target_at(0.0),
             controller=mpc.init(params.options, at.brake(at.x0)),
-            history=History(at.x0[None]),
+            history=PlanningHistory(at.x0[None]),
         )
 
     def edit(

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from labs.algorithms.mpc import Options
-from labs.optimal_control.mpc.systems import TITLES, System, system
+from labs.algorithms.mpc import MpcOptions
+from labs.optimal_control.mpc.systems import TITLES, ControlledSystem, system
 from labs.params import Group, Params
 from labs.tasks.motion.tip_constraints import Ball
 
@@ -158,7 +158,7 @@ class MpcParams(Params):
     """A point mass at the tip that the model does not know of."""
 
     @property
-    def robot(self) -> System:
+    def robot(self) -> ControlledSystem:
         return system(self.system)
 
     @property
@@ -204,8 +204,8 @@ class MpcParams(Params):
         return None if self.iterations == "all" else int(self.iterations)
 
     @property
-    def options(self) -> Options:
-        return Options(
+    def options(self) -> MpcOptions:
+        return MpcOptions(
             warm=self.start == "warm",
             last="zero" if self.last == "zero" else "repeated",
             shrink_from=self.N if self.horizon == "shrinking" else None,

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
-from labs.optimal_control.mpc.history import FAN, History
+from labs.optimal_control.mpc.history import FAN, PlanningHistory
 from labs.optimal_control.mpc.params import MpcParams
 from labs.scene import Scene
 from labs.tasks.motion.motions import tip_path
@@ -34,7 +34,7 @@ def shares(params: MpcParams, x: np.ndarray, u: np.ndarray) -> np.ndarray:
     return np.stack([part[: at.n], part[at.n :], at.mechanism.S @ (np.abs(u) / u_max)])
 
 
-def draw_predictions(scene: Scene, params: MpcParams, history: History) -> None:
+def draw_predictions(scene: Scene, params: MpcParams, history: PlanningHistory) -> None:
     """The path ahead and where it ends, the predictions before it, fading, and the path behind."""
     at = params.robot
     planar = params.system != "ur5"

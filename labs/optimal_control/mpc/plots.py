@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labs.optimal_control.mpc.history import History
+from labs.optimal_control.mpc.history import PlanningHistory
 from labs.optimal_control.mpc.params import MpcParams
 from labs.plots import Bars, Curves, Line, Note, Plot, Readout, TimeSeries, Trace
 from labs.problems.receding_horizon import Plan
@@ -73,7 +73,7 @@ PLOTS: tuple[Plot, ...] = (
 )
 
 
-def prediction_fields(history: History, t: float, joint: int) -> dict[str, np.ndarray]:
+def prediction_fields(history: PlanningHistory, t: float, joint: int) -> dict[str, np.ndarray]:
     """The joint that is shown: the motion so far, what is predicted, and what was."""
     past = history.past[:, joint]
     found = {

@@ -21,7 +21,7 @@ BRAKING = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class System:
+class ControlledSystem:
     """A mechanism, where it starts and how it is integrated."""
 
     title: str
@@ -52,14 +52,14 @@ class System:
 
 
 @cache
-def system(name: str) -> System:
+def system(name: str) -> ControlledSystem:
     """The one of this name, a key of TITLES."""
     body = mechanism(name)
     title, q_limited, v_limited, shown, method, camera = _SYSTEMS[name]
     u_0 = MOTIONS[name].control_scale
     x0 = np.concatenate([body.arm.home, np.zeros(body.nq)])
     limited = np.array(q_limited), np.array(v_limited)
-    return System(title, body, x0, np.array(u_0), *limited, shown, method, camera)
+    return ControlledSystem(title, body, x0, np.array(u_0), *limited, shown, method, camera)
 
 
 @lru_cache(maxsize=32)

@@ -92,7 +92,7 @@ class MpcFeasibility(Lab[MpcFeasibilityParams, MpcFeasibilityState]):
         z = np.array([params.x1, params.x2]) * system.x_max
         state = MpcFeasibilityState(
             z=z,
-            controller=mpc.init(mpc.Options(), np.zeros(1)),
+            controller=mpc.init(mpc.MpcOptions(), np.zeros(1)),
             path=z[None],
             growth=Growth(),
         )
@@ -254,7 +254,7 @@ def _plan(params: MpcFeasibilityParams, state: MpcFeasibilityState) -> MpcFeasib
     setup, soft = params.setup, params.fallback == "soft"
     A, B = feasibility(setup).problem.A, feasibility(setup).problem.B
     U = feasibility(setup).problem.control_set
-    options = mpc.Options(fallback="tail" if params.fallback == "tail" else "brake")
+    options = mpc.MpcOptions(fallback="tail" if params.fallback == "tail" else "brake")
     # The control after which the velocity is zero, or as near to it as U allows.
     brake = np.clip(-(A[1] @ state.z) / B[1], -U.h[1], U.h[0])
     at = run_to_completion(

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labs.algorithms import mpc
-from labs.algorithms.mpc import Options, RecedingHorizon
+from labs.algorithms.mpc import MpcOptions, RecedingHorizon
 from labs.optimal_control.mpc_stability.formulation import Formulation
 from labs.resumable import run_to_completion
 from labs.tasks.phase_plane.systems import STEP
 
-OPTIONS = Options()
+OPTIONS = MpcOptions()
 FAR = 1.2
 """Beyond so many times the window a run ends."""
 KEPT = 600
@@ -18,7 +18,7 @@ KEPT = 600
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class ClosedLoopRun:
     """From its start. Arrays are never written after they are made."""
 
     x: np.ndarray
@@ -50,16 +50,16 @@ class Run:
         return np.asarray((np.diff(self.V) + self.paid[:-1])[both])
 
 
-def begin(formulation: Formulation, x: np.ndarray) -> Run:
+def begin(formulation: Formulation, x: np.ndarray) -> ClosedLoopRun:
     """At x (2,), with the first plan; none where there is no such problem."""
     controller, nothing = mpc.init(OPTIONS, np.zeros(1)), np.zeros(0)
-    run = Run(
+    run = ClosedLoopRun(
         x, 0, controller, np.zeros((0, 2)), nothing, nothing > 0.0, nothing, formulation.trouble
     )
     return run if run.ended else _plan(formulation, run)
 
 
-def advance(formulation: Formulation, run: Run) -> Run:
+def advance(formulation: Formulation, run: ClosedLoopRun) -> ClosedLoopRun:
     """STEP later. Far outside the window a run ends."""
     if run.ended:
         return run
@@ -73,12 +73,12 @@ def advance(formulation: Formulation, run: Run) -> Run:
     return _plan(formulation, run)
 
 
-def control(formulation: Formulation, run: Run) -> np.ndarray:
+def control(formulation: Formulation, run: ClosedLoopRun) -> np.ndarray:
     """(1,) what acts: the plan's, on top of the reference's."""
     return np.asarray(run.controller.u + formulation.reference.controls(np.array(max(run.k, 0))))
 
 
-def _plan(formulation: Formulation, run: Run) -> Run:
+def _plan(formulation: Formulation, run: ClosedLoopRun) -> ClosedLoopRun:
     """At the beginning of a period."""
     k, problem = run.k + 1, formulation.problem
     error = run.x - formulation.reference.states(np.array(k))

@@ -33,7 +33,7 @@ WINDOW = 1.1
 
 
 @dataclass(frozen=True)
-class Settings:
+class FormulationSettings:
     """What fixes a formulation: see the parameters of these names."""
 
     system: str
@@ -57,7 +57,7 @@ class Settings:
 class Formulation:
     """The problem with all it is made of."""
 
-    settings: Settings
+    settings: FormulationSettings
     problem: LinearMpcProblem
     K: np.ndarray
     """(1, 2) the terminal control law u = K x."""
@@ -117,7 +117,7 @@ class Formulation:
 
 
 @lru_cache(maxsize=64)
-def formulate(settings: Settings) -> Formulation:
+def formulate(settings: FormulationSettings) -> Formulation:
     """What cannot be put together says why and stands without a terminal set."""
     system = plane_system(settings.system)
     A, B, _ = system.linear(settings.period)

@@ -11,7 +11,7 @@ from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.number_texts import counted
 from labs.optimal_control.mpc_stability import closed_loop, picture
 from labs.optimal_control.mpc_stability.assumptions import sentences
-from labs.optimal_control.mpc_stability.closed_loop import Run
+from labs.optimal_control.mpc_stability.closed_loop import ClosedLoopRun
 from labs.optimal_control.mpc_stability.formulation import Formulation
 from labs.optimal_control.mpc_stability.params import MpcStabilityParams
 from labs.optimal_control.mpc_stability.plots import (
@@ -39,7 +39,7 @@ class MpcStabilityState(State):
 
     steps: int = 0
     """World steps done: t = steps * period."""
-    run: Run
+    run: ClosedLoopRun
     of: str
     """The problem and the start that the run is of."""
     surface: ValueSurface
@@ -210,7 +210,7 @@ def _summary(formulation: Formulation, surface: ValueSurface) -> str:
     )
 
 
-def _account(run: Run) -> str:
+def _account(run: ClosedLoopRun) -> str:
     """How the run fares."""
     if run.ended or run.controller.status:
         return "\n".join(filter(None, [run.controller.status, run.ended]))

@@ -11,7 +11,7 @@ from labs.optimal_control.mpc_stability.formulation import (
     TERMINAL_COSTS,
     TERMINAL_SETS,
     Formulation,
-    Settings,
+    FormulationSettings,
     formulate,
 )
 from labs.params import Group, Params, Value
@@ -103,7 +103,7 @@ class MpcStabilityParams(Params):
     @property
     def formulation(self) -> Formulation:
         return formulate(
-            Settings(
+            FormulationSettings(
                 system=self.system,
                 period=self.period,
                 task=self.task,

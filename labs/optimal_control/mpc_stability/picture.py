@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from labs.optimal_control.mpc_stability.closed_loop import Run
+from labs.optimal_control.mpc_stability.closed_loop import ClosedLoopRun
 from labs.optimal_control.mpc_stability.formulation import WINDOW, Formulation
 from labs.optimal_control.mpc_stability.value_surface import ValueSurface
 from labs.scene import Scene
@@ -43,7 +43,7 @@ def plane_of(system: str) -> PhasePlane:
     return replace(plane, camera=CAMERAS[system], body_place=place)
 
 
-def draw(scene: Scene, formulation: Formulation, surface: ValueSurface, run: Run) -> None:
+def draw(scene: Scene, formulation: Formulation, surface: ValueSurface, run: ClosedLoopRun) -> None:
     """All of it."""
     plane = plane_of(formulation.settings.system)
     plane.draw_axes(scene)
@@ -79,7 +79,9 @@ def _draw_surface(scene: Scene, plane: PhasePlane, surface: ValueSurface, scale:
     scene.label("top of V", text, plane.place(points[top], lifts[top] + 0.06))
 
 
-def _draw_run(scene: Scene, plane: PhasePlane, run: Run, scale: "_Scale", past: np.ndarray) -> None:
+def _draw_run(
+    scene: Scene, plane: PhasePlane, run: ClosedLoopRun, scale: "_Scale", past: np.ndarray
+) -> None:
     """The path on the surface, or where there is none in the plane, past the reference (k, 2);
     what is planned; and the ball that is dragged."""
     inside = ((run.path >= plane.lower) & (run.path <= plane.upper)).all(axis=1)
@@ -114,7 +116,7 @@ def _level(points: np.ndarray, lifts: np.ndarray, height: float) -> np.ndarray:
 class _Scale:
     """Heights of values."""
 
-    def __init__(self, surface: ValueSurface, run: Run) -> None:
+    def __init__(self, surface: ValueSurface, run: ClosedLoopRun) -> None:
         self.known = bool(surface.V.size)
         values = surface.V if self.known else np.zeros(1)
         self.low = min(float(values.min()), 0.0)

@@ -4,13 +4,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labs.optimal_control.mpc_stability.closed_loop import Run
+from labs.optimal_control.mpc_stability.closed_loop import ClosedLoopRun
 from labs.optimal_control.mpc_stability.value_surface import ValueSurface
-from labs.plots import Bars, Curves, Line, Note, Plot, Readout, TimeSeries, Trace, When
+from labs.plots import Bars, Curves, Line, Note, Plot, Readout, ShownWhen, TimeSeries, Trace
 
 CHANGES = ("falls by l", "falls by less", "rises", "infeasible next")
 
-AT_REST: When = {"task": ("regulate", "economic")}
+AT_REST: ShownWhen = {"task": ("regulate", "economic")}
 
 PLOTS: tuple[Plot, ...] = (
     Curves(
@@ -53,7 +53,7 @@ PLOTS: tuple[Plot, ...] = (
 )
 
 
-def run_fields(run: Run) -> Mapping[str, np.ndarray]:
+def run_fields(run: ClosedLoopRun) -> Mapping[str, np.ndarray]:
     """V* at every period of the run that has one, with what the theorem allows it."""
     has = run.found
     k = np.arange(len(run.V)) + (run.k + 1 - len(run.V))

@@ -27,7 +27,7 @@ from labs.optimal_control.mpc_uncertainty.plots import (
     readouts,
     run_fields,
 )
-from labs.optimal_control.mpc_uncertainty.runs import STEPS, Runs, simulate
+from labs.optimal_control.mpc_uncertainty.runs import STEPS, DisturbedRuns, simulate
 from labs.optimal_control.mpc_uncertainty.statistics import Counts, count
 from labs.params import Value
 from labs.scene import Scene
@@ -42,7 +42,7 @@ REST = 60
 class UncertaintyState(State):
     """The runs, what was counted, and how far they are played."""
 
-    runs: Runs
+    runs: DisturbedRuns
     counts: Counts
     clock: int = 0
     """World steps since the runs began."""
@@ -72,7 +72,7 @@ class MpcUncertainty(Lab[UncertaintyParams, UncertaintyState]):
 
     def init(self, params: UncertaintyParams, rng: np.random.Generator) -> UncertaintyState:
         """At the start; the disturbances have a seed of their own."""
-        runs = Runs.start(params)
+        runs = DisturbedRuns.start(params)
         return UncertaintyState(runs=runs, counts=count(params, controllers(params), runs))
 
     # The solver's clock -----------------------------------------------------------------------

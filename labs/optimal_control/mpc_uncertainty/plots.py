@@ -13,7 +13,7 @@ from labs.optimal_control.mpc_uncertainty.controllers import (
     T,
 )
 from labs.optimal_control.mpc_uncertainty.params import UncertaintyParams
-from labs.optimal_control.mpc_uncertainty.runs import STEPS, Runs
+from labs.optimal_control.mpc_uncertainty.runs import STEPS, DisturbedRuns
 from labs.optimal_control.mpc_uncertainty.statistics import HELD, Counts, promised_interval
 from labs.plots import Bars, Curves, Note, Plot, Readout, Trace
 from labs.resumable import run_to_completion
@@ -94,7 +94,9 @@ def design_fields(params: UncertaintyParams, chosen: Controllers) -> dict[str, n
     )
 
 
-def run_fields(params: UncertaintyParams, runs: Runs, counts: Counts) -> dict[str, np.ndarray]:
+def run_fields(
+    params: UncertaintyParams, runs: DisturbedRuns, counts: Counts
+) -> dict[str, np.ndarray]:
     """What happened, and what was promised."""
     low, high = promised_interval(params)
     whole, ones = np.array([0.0, STEPS * T]), np.ones(2)
@@ -124,7 +126,7 @@ def _by_name(what: str, rows: np.ndarray) -> dict[str, np.ndarray]:
     return {f"{what}_{name}": row for name, row in zip(NAMES, rows, strict=True)}
 
 
-def readouts(params: UncertaintyParams, runs: Runs, counts: Counts) -> dict[str, float]:
+def readouts(params: UncertaintyParams, runs: DisturbedRuns, counts: Counts) -> dict[str, float]:
     """Shares [%] of the runs beyond the wall, once they have arrived, and of plans not found."""
     shown = {"risk": 100.0 - params.probability}
     if runs.steps < STEPS:
@@ -137,7 +139,9 @@ def readouts(params: UncertaintyParams, runs: Runs, counts: Counts) -> dict[str,
     }
 
 
-def promise(params: UncertaintyParams, chosen: Controllers, runs: Runs, counts: Counts) -> str:
+def promise(
+    params: UncertaintyParams, chosen: Controllers, runs: DisturbedRuns, counts: Counts
+) -> str:
     """What was promised, and what was counted."""
     if runs.steps < STEPS:
         return "The runs are not complete yet."

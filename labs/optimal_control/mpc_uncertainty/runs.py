@@ -22,7 +22,7 @@ STEPS = 40
 
 
 @dataclass(frozen=True, eq=False)
-class Runs:
+class DisturbedRuns:
     """All that happened so far; arrays are never written into again."""
 
     X: np.ndarray
@@ -48,23 +48,23 @@ class Runs:
 
     def append(
         self, x: np.ndarray, u: np.ndarray, planned: np.ndarray, plans: np.ndarray
-    ) -> "Runs":
+    ) -> "DisturbedRuns":
         """A step later."""
         added = ((self.X, x), (self.U, u), (self.planned, planned), (self.plans, plans))
-        return Runs(*(np.concatenate([old, new[:, None]], axis=1) for old, new in added))
+        return DisturbedRuns(*(np.concatenate([old, new[:, None]], axis=1) for old, new in added))
 
     @property
     def steps(self) -> int:
         return int(self.U.shape[1])
 
 
-def simulate(params: UncertaintyParams, chosen: Controllers) -> Iterator[Runs | None]:
+def simulate(params: UncertaintyParams, chosen: Controllers) -> Iterator[DisturbedRuns | None]:
     """The runs after each step; None in the midst of one. Where there is no plan, u = K (x - the
     place nearest to the target where the plan may stay); no force is above its limit."""
     problem, K = chosen.problems[NOMINAL], chosen.K[0]
     w = disturbances(params, problem.A + problem.B @ chosen.K, STEPS)
     rests = np.stack([np.minimum(chosen.ends, params.target), np.zeros(3)], axis=1)
-    runs, prediction = Runs.start(params), None
+    runs, prediction = DisturbedRuns.start(params), None
     for k in range(STEPS):
         x = runs.X[:, -1]
         prediction = yield from _predict(params, chosen, prediction)

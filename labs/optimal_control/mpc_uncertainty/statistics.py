@@ -7,7 +7,7 @@ from scipy.stats import binom
 
 from labs.optimal_control.mpc_uncertainty.controllers import NOMINAL, Controllers
 from labs.optimal_control.mpc_uncertainty.params import UncertaintyParams
-from labs.optimal_control.mpc_uncertainty.runs import STEPS, Runs
+from labs.optimal_control.mpc_uncertainty.runs import STEPS, DisturbedRuns
 
 CONFIDENCE = 0.95
 HELD = STEPS // 2
@@ -34,7 +34,7 @@ class Counts:
     """The share of steps at which there was no plan."""
 
 
-def count(params: UncertaintyParams, chosen: Controllers, runs: Runs) -> Counts:
+def count(params: UncertaintyParams, chosen: Controllers, runs: DisturbedRuns) -> Counts:
     """Over all runs so far."""
     problem = chosen.problems[NOMINAL]
     away = runs.X[:, :-1] - np.array([params.target, 0.0])

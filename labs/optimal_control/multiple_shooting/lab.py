@@ -20,12 +20,12 @@ from labs.optimal_control.multiple_shooting.plots import (
     segment_fields,
     study_fields,
 )
-from labs.optimal_control.multiple_shooting.study import Study, no_study, study_segments
+from labs.optimal_control.multiple_shooting.study import SegmentSweep, no_study, study_segments
 from labs.params import Value
 from labs.resumable import run_to_completion
 from labs.scene import Scene
 from labs.tasks.direct.guesses import first_guess, start_guess
-from labs.tasks.direct.history import History
+from labs.tasks.direct.history import IterationHistory
 from labs.tasks.direct.motions import multiple_shooting_motion
 from labs.tasks.direct.picture import draw_goal, draw_now, draw_robots
 from labs.tasks.direct.plan_params import CHOICE_SETTINGS
@@ -40,7 +40,7 @@ class MultipleShootingState(DirectState):
     """With the segments of its motion, and what was compared."""
 
     anatomy: Anatomy
-    study: Study
+    study: SegmentSweep
 
 
 class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
@@ -87,7 +87,7 @@ class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
         return MultipleShootingState(
             motion=motion,
             plan=plan,
-            history=History.start(params, at, motion),
+            history=IterationHistory.start(params, at, motion),
             playback=start_playback(plan),
             missed=np.zeros(0),
             anatomy=run_to_completion(anatomy(shooting, z, params.task.u_0)),
@@ -106,7 +106,7 @@ class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
             yield Snapshot(1, _kept(state), at.stopped)
             return
         motion = multiple_shooting_motion(shooting, at.y)
-        history = History.start(params, at, motion)
+        history = IterationHistory.start(params, at, motion)
         while not at.stopped:
             at = yield from sqp.step_in_pieces(shooting, options, at)
             yield None

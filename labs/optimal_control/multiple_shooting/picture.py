@@ -6,14 +6,16 @@ import numpy as np
 
 from labs.optimal_control.multiple_shooting.anatomy import Anatomy
 from labs.scene import Color, Scene
-from labs.tasks.direct.history import History
+from labs.tasks.direct.history import IterationHistory
 from labs.tasks.direct.picture import OPEN
 
 COLORS: tuple[Color, Color] = ("reference", "actual")
 """Of segments in turn."""
 
 
-def draw_segments(scene: Scene, history: History, at: Anatomy, failed: bool, bead: float) -> None:
+def draw_segments(
+    scene: Scene, history: IterationHistory, at: Anatomy, failed: bool, bead: float
+) -> None:
     """Each from a bead of this radius [m] at its start; a line to the next where there is a gap."""
     tips = history.tips[-1]
     for i, (begin, end) in enumerate(pairwise(at.cuts)):

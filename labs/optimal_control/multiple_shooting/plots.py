@@ -5,9 +5,9 @@ from itertools import pairwise
 import numpy as np
 
 from labs.optimal_control.multiple_shooting.anatomy import Anatomy
-from labs.optimal_control.multiple_shooting.study import Study
+from labs.optimal_control.multiple_shooting.study import SegmentSweep
 from labs.plots import Curves, HeatMap, Plot, Readout, Trace
-from labs.tasks.direct.history import History
+from labs.tasks.direct.history import IterationHistory
 from labs.tasks.direct.plan_params import LIGHT
 from labs.tasks.direct.plots import control_played, position_played
 
@@ -112,7 +112,7 @@ PLOTS: tuple[Plot, ...] = (
 )
 
 
-def iteration_fields(history: History, cuts: np.ndarray) -> dict[str, np.ndarray]:
+def iteration_fields(history: IterationHistory, cuts: np.ndarray) -> dict[str, np.ndarray]:
     """Numbers of all iterations so far, and every gap in each."""
     gaps = history.gaps[:, cuts[1:-1] - 1]
     shown = np.where(gaps > 0.0, np.log10(np.maximum(gaps, 1e-300)), np.nan)
@@ -131,7 +131,7 @@ def iteration_fields(history: History, cuts: np.ndarray) -> dict[str, np.ndarray
     }
 
 
-def segment_fields(history: History, at: Anatomy, T: float) -> dict[str, np.ndarray]:
+def segment_fields(history: IterationHistory, at: Anatomy, T: float) -> dict[str, np.ndarray]:
     """The segments in the phase plane, and what a deviation becomes in them."""
     h, phases = T / len(at.growth), history.phases[-1]
     between = list(pairwise(at.cuts))
@@ -155,7 +155,7 @@ def segment_fields(history: History, at: Anatomy, T: float) -> dict[str, np.ndar
     }
 
 
-def study_fields(study: Study) -> dict[str, np.ndarray]:
+def study_fields(study: SegmentSweep) -> dict[str, np.ndarray]:
     """Curves over the number of segments; empty where none were compared."""
     good = study.converged
     return {

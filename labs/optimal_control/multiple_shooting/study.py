@@ -17,7 +17,7 @@ PARTS = (1, 2, 4, 5, 10, 20, 40)
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class SegmentSweep:
     """Of each number of segments tried. Arrays are never written into again."""
 
     segments: np.ndarray
@@ -34,18 +34,18 @@ class Study:
     """(k,)"""
 
 
-def no_study() -> Study:
+def no_study() -> SegmentSweep:
     """Of none."""
     none = np.zeros(0)
-    return Study(none, none, none, np.zeros(0, bool), none, none)
+    return SegmentSweep(none, none, none, np.zeros(0, bool), none, none)
 
 
-def study_segments(params: MultipleShootingParams) -> Iterator[Study | None]:
+def study_segments(params: MultipleShootingParams) -> Iterator[SegmentSweep | None]:
     """From the first guess, each until it stops or has had its iterations, the most segments first;
     what is known after each of them, and None in between."""
     rows: list[tuple[float, ...]] = []
     guess = first_guess(params, params.N)
-    options = sqp.Options(hessian=params.hessian, iterations=MOST_ITERATIONS)
+    options = sqp.SqpOptions(hessian=params.hessian, iterations=MOST_ITERATIONS)
     for m in sorted({m for m in PARTS if m < params.N} | {params.N}, reverse=True):
         shooting = params.shooting(m)
         at = sqp.init(shooting, shooting.variables(guess.X, guess.U, guess.T), options)
@@ -59,4 +59,4 @@ def study_segments(params: MultipleShootingParams) -> Iterator[Study | None]:
         rows.insert(0, (m, at.iteration, at.values.f, at.converged, entries, shooting.n))
         columns = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
         segments, iterations, cost, converged, *sizes = columns
-        yield Study(segments, iterations, cost, converged.astype(bool), *sizes)
+        yield SegmentSweep(segments, iterations, cost, converged.astype(bool), *sizes)

@@ -8,7 +8,7 @@ import numpy as np
 
 from labs.algorithms.single_shooting import SingleShooting
 from labs.arrays import with_row
-from labs.optimal_control.single_shooting.plan import Plan, held_where_diverged
+from labs.optimal_control.single_shooting.plan import ShootingPlan, held_where_diverged
 from labs.problems.continuous_control import ContinuousProblem
 from labs.tasks.direct.systems import system
 from labs.tasks.motion.continuous import continuous_motion
@@ -44,14 +44,14 @@ class Ends:
 
 
 @lru_cache(maxsize=4)
-def changed_motions(name: str, plan: Plan, k: int, change: float) -> Changed:
+def changed_motions(name: str, plan: ShootingPlan, k: int, change: float) -> Changed:
     """When u_k of the system of this name becomes u_k + change u_0."""
     fan = np.array([_with_change(name, plan, k, part * change) for part in FAN])
     return Changed(fan, plan.X + change * _sensitivity(name, plan, k))
 
 
 @lru_cache(maxsize=4)
-def changed_ends(name: str, plan: Plan, k: int) -> Ends:
+def changed_ends(name: str, plan: ShootingPlan, k: int) -> Ends:
     """Over changes of u_k within RANGE."""
     steps = (plan.N - k) * plan.M
     count = int(np.clip(STEPS // steps, LEAST_ENDS, MOST_ENDS)) | 1  # odd: none is among them
@@ -61,7 +61,7 @@ def changed_ends(name: str, plan: Plan, k: int) -> Ends:
     return Ends(changes, truth, plan.X[-1] + changes[:, None] * slope)
 
 
-def _with_change(name: str, plan: Plan, k: int, change: float) -> np.ndarray:
+def _with_change(name: str, plan: ShootingPlan, k: int, change: float) -> np.ndarray:
     """X (N M + 1, nx) with u_k + change u_0 of that motor."""
     at = system(name)
     u = plan.U[k].copy()
@@ -72,14 +72,14 @@ def _with_change(name: str, plan: Plan, k: int, change: float) -> np.ndarray:
     return np.concatenate([plan.X[: k * plan.M], held_where_diverged(X)])
 
 
-def _sensitivity(name: str, plan: Plan, k: int) -> np.ndarray:
+def _sensitivity(name: str, plan: ShootingPlan, k: int) -> np.ndarray:
     """dx_j/d(u_k/u_0) (N M + 1, nx) of that motor: none before t_k."""
     tail, at = _tail(name, plan, k), system(name)
     S = tail.sensitivities(tail.linearize(tail.pack(plan.U[k:])))[:, :, at.motor]
     return np.concatenate([np.zeros((k * plan.M, tail.nx)), S * at.u_0[at.motor]])
 
 
-def _tail(name: str, plan: Plan, k: int) -> SingleShooting:
+def _tail(name: str, plan: ShootingPlan, k: int) -> SingleShooting:
     """From piece k to the end, its controls free."""
     at, T = system(name), plan.T * (1.0 - k / plan.N)
     x, u = np.full(at.mechanism.nx, np.inf), np.full(at.mechanism.nu, np.inf)

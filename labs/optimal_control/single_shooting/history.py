@@ -5,14 +5,14 @@ from typing import Self
 
 import numpy as np
 
-from labs.algorithms.sqp import Iterate
+from labs.algorithms.sqp import SqpIterate
 
 KEPT = 7
 """Iterations whose paths are drawn."""
 
 
 @dataclass(frozen=True, eq=False)
-class History:
+class ShootingHistory:
     """Numbers of all iterations and the last paths. Arrays are never written into again."""
 
     cost: np.ndarray
@@ -27,12 +27,12 @@ class History:
     """(KEPT, points, 3) [m] of the tip, the newest last."""
 
     @classmethod
-    def start(cls, at: Iterate, path: np.ndarray) -> Self:
+    def start(cls, at: SqpIterate, path: np.ndarray) -> Self:
         """Of a first guess with its path (points, 3)."""
         none, paths = np.zeros(0), np.tile(path, (KEPT, 1, 1))
         return cls(np.array([at.values.f]), np.array([at.violation]), none, none, paths)
 
-    def append(self, at: Iterate, path: np.ndarray) -> Self:
+    def append(self, at: SqpIterate, path: np.ndarray) -> Self:
         """One iteration later."""
         return type(self)(
             np.append(self.cost, at.values.f),

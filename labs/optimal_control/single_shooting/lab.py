@@ -9,9 +9,9 @@ import numpy as np
 
 from labs.algorithms import riccati, sqp
 from labs.algorithms.single_shooting import SingleShooting
-from labs.algorithms.sqp import Iterate
+from labs.algorithms.sqp import SqpIterate
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
-from labs.optimal_control.single_shooting.history import History
+from labs.optimal_control.single_shooting.history import ShootingHistory
 from labs.optimal_control.single_shooting.params import CHOICE_SETTINGS, SingleShootingParams
 from labs.optimal_control.single_shooting.picture import (
     dragged_control,
@@ -20,7 +20,7 @@ from labs.optimal_control.single_shooting.picture import (
     draw_robots,
     world_line,
 )
-from labs.optimal_control.single_shooting.plan import Plan, make_plan, state_at
+from labs.optimal_control.single_shooting.plan import ShootingPlan, make_plan, state_at
 from labs.optimal_control.single_shooting.plots import (
     PLOTS,
     change_fields,
@@ -30,7 +30,7 @@ from labs.optimal_control.single_shooting.plots import (
 )
 from labs.optimal_control.single_shooting.studies import (
     NO_STUDY,
-    Study,
+    AccuracyStudy,
     study_gradients,
     study_integration,
 )
@@ -46,9 +46,9 @@ from labs.tasks.motion.player import PERIOD, REST_STEPS
 class SingleShootingState(State):
     """The plan, how it was found, and where in its motion the robot is."""
 
-    plan: Plan
-    history: History
-    study: Study = NO_STUDY
+    plan: ShootingPlan
+    history: ShootingHistory
+    study: AccuracyStudy = NO_STUDY
     failed: bool = False
     """Whether the last solve ended without a solution."""
     reusable: bool = False
@@ -104,7 +104,9 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
             y = shooting.pack(np.tile(params.task.holding, (params.N, 1)))
         at = sqp.init(shooting, y, params.options)
         plan = make_plan(params, shooting, at.y)
-        return SingleShootingState(plan=plan, history=History.start(at, _path(params, plan)))
+        return SingleShootingState(
+            plan=plan, history=ShootingHistory.start(at, _path(params, plan))
+        )
 
     # The solver's clock -----------------------------------------------------------------------
 
@@ -121,7 +123,7 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
             return
         if params.studied == "gradients":
             study = yield from study_gradients(params, seconds)
-        history = History.start(at, _path(params, make_plan(params, shooting, at.y)))
+        history = ShootingHistory.start(at, _path(params, make_plan(params, shooting, at.y)))
         while not at.stopped:
             at = yield from sqp.step_in_pieces(shooting, params.options, at)
             yield None
@@ -246,15 +248,15 @@ def _divergence(shooting: SingleShooting, y: np.ndarray) -> str:
     )
 
 
-def _path(params: SingleShootingParams, plan: Plan) -> np.ndarray:
+def _path(params: SingleShootingParams, plan: ShootingPlan) -> np.ndarray:
     return world_line(params.task, plan.X, plan.T)
 
 
 def _snapshot_data(
-    plan: Plan,
-    history: History,
-    study: Study,
-    at: Iterate,
+    plan: ShootingPlan,
+    history: ShootingHistory,
+    study: AccuracyStudy,
+    at: SqpIterate,
     seconds: Mapping[str, float | np.ndarray],
 ) -> dict[str, Any]:
     return {

@@ -9,13 +9,13 @@ import numpy as np
 from labs.optimal_control.single_shooting.changes import changed_motions
 from labs.optimal_control.single_shooting.history import KEPT
 from labs.optimal_control.single_shooting.params import SingleShootingParams
-from labs.optimal_control.single_shooting.plan import Plan, state_at
+from labs.optimal_control.single_shooting.plan import ShootingPlan, state_at
 from labs.params import Value
 from labs.scene import Scene
 from labs.shapes import Vector3
 from labs.tasks.direct.history import drawn
 from labs.tasks.direct.systems import CAMERAS as TASK_CAMERAS
-from labs.tasks.direct.systems import System, system
+from labs.tasks.direct.systems import RestToRestTask, system
 
 CAMERAS: Mapping[str, tuple[Vector3, Vector3]] = {
     "mass": ((2.2, 0.7, 1.45), (-0.1, 0.35, 0.4)),
@@ -45,7 +45,7 @@ APART = 0.1
 """[m] between the tips from which on the ghost says what it is."""
 
 
-def draw_robots(scene: Scene, params: SingleShootingParams, plan: Plan, t: float) -> None:
+def draw_robots(scene: Scene, params: SingleShootingParams, plan: ShootingPlan, t: float) -> None:
     """The robot as the simulation has it at t [s], and as the ghost where the changed control
     would have it; without a change, where the plan has it."""
     at = params.task
@@ -66,7 +66,7 @@ def draw_robots(scene: Scene, params: SingleShootingParams, plan: Plan, t: float
 def draw_paths(
     scene: Scene,
     params: SingleShootingParams,
-    plan: Plan,
+    plan: ShootingPlan,
     paths: np.ndarray,
     t: float,
     failed: bool,
@@ -109,7 +109,7 @@ def dragged_control(
     }
 
 
-def world_line(at: System, X: np.ndarray, T: float) -> np.ndarray:
+def world_line(at: RestToRestTask, X: np.ndarray, T: float) -> np.ndarray:
     """(POINTS, 3) [m] of the tip along X (k + 1, nx) over T [s], as it is drawn."""
     t = np.linspace(0.0, T, POINTS)
     tips = [at.mechanism.tip(state_at(X, T, time)[: at.mechanism.nq]) for time in t]
@@ -117,12 +117,12 @@ def world_line(at: System, X: np.ndarray, T: float) -> np.ndarray:
 
 
 @lru_cache(maxsize=4)
-def _fan_lines(name: str, plan: Plan, k: int, change: float) -> tuple[np.ndarray, ...]:
+def _fan_lines(name: str, plan: ShootingPlan, k: int, change: float) -> tuple[np.ndarray, ...]:
     """Of the motions with other controls u_k, the last as chosen."""
     fan = changed_motions(name, plan, k, change).fan
     return tuple(world_line(system(name), X, plan.T) for X in fan)
 
 
-def _piece(params: SingleShootingParams, plan: Plan) -> int:
+def _piece(params: SingleShootingParams, plan: ShootingPlan) -> int:
     """The changed piece, in a plan that may have fewer than are asked for now."""
     return min(params.chosen, plan.N - 1)

@@ -15,7 +15,7 @@ LARGEST_CONDITION = 1e15
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class ShootingPlan:
     """Plain data; arrays are never written into again."""
 
     U: np.ndarray
@@ -62,7 +62,9 @@ def state_at(X: np.ndarray, T: float, t: float) -> np.ndarray:
     return np.asarray(X[j] + (place - j) * (X[j + 1] - X[j]))
 
 
-def make_plan(params: SingleShootingParams, shooting: SingleShooting, y: np.ndarray) -> Plan:
+def make_plan(
+    params: SingleShootingParams, shooting: SingleShooting, y: np.ndarray
+) -> ShootingPlan:
     """Of the variables y, whose rollout does not diverge."""
     u_0, N, nu = params.task.u_0, shooting.N, shooting.nu
     at = shooting.linearize(y, gauss_newton=True)
@@ -74,7 +76,7 @@ def make_plan(params: SingleShootingParams, shooting: SingleShooting, y: np.ndar
     U, X = shooting.controls(y).copy(), shooting.rollout(y).X
     nodes, K = X[:: shooting.M], tracking_gains(at, N, u_0)
     simulated, _ = simulate(params.task, nodes, U, np.zeros_like(K), T)
-    return Plan(
+    return ShootingPlan(
         U,
         X,
         T,

@@ -6,15 +6,15 @@ import numpy as np
 
 from labs.algorithms.shooting_steps import SHOOTING_METHODS
 from labs.optimal_control.single_shooting.changes import FAN, changed_ends, changed_motions
-from labs.optimal_control.single_shooting.history import History
+from labs.optimal_control.single_shooting.history import ShootingHistory
 from labs.optimal_control.single_shooting.params import SingleShootingParams
-from labs.optimal_control.single_shooting.plan import Plan
+from labs.optimal_control.single_shooting.plan import ShootingPlan
 from labs.optimal_control.single_shooting.studies import (
     DIFFERENCES,
     INTEGRATION_STEPS,
     SIZES,
     WAYS,
-    Study,
+    AccuracyStudy,
 )
 from labs.plots import Curves, HeatMap, Line, Plot, Readout, TimeSeries, Trace
 
@@ -133,7 +133,7 @@ PLOTS: tuple[Plot, ...] = (
 )
 
 
-def iteration_fields(history: History) -> dict[str, np.ndarray]:
+def iteration_fields(history: ShootingHistory) -> dict[str, np.ndarray]:
     """Numbers of all iterations so far."""
     return {
         "iterations": np.arange(len(history.cost), dtype=float),
@@ -145,7 +145,7 @@ def iteration_fields(history: History) -> dict[str, np.ndarray]:
     }
 
 
-def sensitivity_fields(plan: Plan, chosen: int, grown: float) -> dict[str, np.ndarray]:
+def sensitivity_fields(plan: ShootingPlan, chosen: int, grown: float) -> dict[str, np.ndarray]:
     """The map, its rows up to the part `grown` of the motion, and three of its columns."""
     N = plan.N
     times = np.linspace(0.0, plan.T, N + 1)
@@ -162,7 +162,7 @@ def sensitivity_fields(plan: Plan, chosen: int, grown: float) -> dict[str, np.nd
     }
 
 
-def change_fields(params: SingleShootingParams, plan: Plan) -> dict[str, np.ndarray]:
+def change_fields(params: SingleShootingParams, plan: ShootingPlan) -> dict[str, np.ndarray]:
     """The joint that tells most, and where it ends, as the chosen control changes."""
     k, j = min(params.chosen, plan.N - 1), params.task.shown
     changed = changed_motions(params.system, plan, k, params.delta)
@@ -188,7 +188,9 @@ def change_fields(params: SingleShootingParams, plan: Plan) -> dict[str, np.ndar
     }
 
 
-def study_fields(study: Study, seconds: Mapping[str, float | np.ndarray]) -> dict[str, np.ndarray]:
+def study_fields(
+    study: AccuracyStudy, seconds: Mapping[str, float | np.ndarray]
+) -> dict[str, np.ndarray]:
     """Curves of what was measured besides; empty where it was not."""
     measured = len(study.gradient_errors) > 0
     times = [np.atleast_1d(seconds.get(way, np.zeros(0))) for way in WAYS]

@@ -11,17 +11,17 @@ import numpy as np
 
 from labs.algorithms import riccati
 from labs.algorithms.integrators import rk4
-from labs.algorithms.shooting_steps import Linearization
+from labs.algorithms.shooting_steps import StepDerivatives
 from labs.errors import LabError
 from labs.problems.linear_quadratic import LqrProblem
 from labs.problems.optimal_control import LARGEST_STATE
-from labs.tasks.direct.systems import System
+from labs.tasks.direct.systems import RestToRestTask
 
 STEP = 0.01
 """[s] The most a step of the simulation takes; it goes by RK4."""
 
 
-def tracking_gains(linearization: Linearization, N: int, u_0: np.ndarray) -> np.ndarray:
+def tracking_gains(linearization: StepDerivatives, N: int, u_0: np.ndarray) -> np.ndarray:
     """K (N, nu, nx) for a plan of N pieces; zero where P grows beyond all numbers."""
     nx, nu = linearization.A.shape[1], len(u_0)
     A, B = np.tile(np.eye(nx), (N, 1, 1)), np.zeros((N, nx, nu))
@@ -37,7 +37,7 @@ def tracking_gains(linearization: Linearization, N: int, u_0: np.ndarray) -> np.
 
 
 def simulate(
-    at: System, X: np.ndarray, U: np.ndarray, K: np.ndarray, T: float
+    at: RestToRestTask, X: np.ndarray, U: np.ndarray, K: np.ndarray, T: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """States (k N + 1, nx) on an even grid over T [s], and the controls (N, nu) that were given.
     X (N + 1, nx) and U (N, nu) are the plan's. It rests where it diverges."""

@@ -8,7 +8,7 @@ import numpy as np
 from labs.algorithms.shooting_steps import FORMS, SHOOTING_METHODS, CostForm
 from labs.algorithms.single_shooting import SingleShooting
 from labs.optimal_control.single_shooting.params import SingleShootingParams
-from labs.optimal_control.single_shooting.plan import Plan
+from labs.optimal_control.single_shooting.plan import ShootingPlan
 from labs.resumable import Resumable, timed
 
 WAYS = ("sensitivities", "adjoint", "differences")
@@ -28,7 +28,7 @@ REFERENCE_STEPS = 100
 
 
 @dataclass(frozen=True)
-class Study:
+class AccuracyStudy:
     """Plain data; what was not asked for has no rows. All errors are relative to the truth."""
 
     gradient_errors: np.ndarray
@@ -41,12 +41,14 @@ class Study:
     """(len(INTEGRATION_STEPS), 2): of J by the augmented state, and by the notes' sum."""
 
 
-NO_STUDY = Study(np.zeros((0, 2)), 0.0, np.zeros((0, len(SHOOTING_METHODS))), np.zeros((0, 2)))
+NO_STUDY = AccuracyStudy(
+    np.zeros((0, 2)), 0.0, np.zeros((0, len(SHOOTING_METHODS))), np.zeros((0, 2))
+)
 
 
 def study_gradients(
     params: SingleShootingParams, seconds: dict[str, float | np.ndarray]
-) -> Resumable[Study]:
+) -> Resumable[AccuracyStudy]:
     """At the first guess, which must not diverge: errors over eps, and in `seconds` the times
     over N by the names of WAYS."""
     shooting = params.transcription(COMPARED_PIECES, params.M, params.integrator)
@@ -66,10 +68,10 @@ def study_gradients(
     seconds |= dict(zip(WAYS, times.T, strict=True))
     off = float(np.linalg.norm(same - exact) / size)
     finite = np.where(np.isfinite(errors), errors, 0.0)
-    return Study(finite, off, NO_STUDY.state_errors, NO_STUDY.cost_errors)
+    return AccuracyStudy(finite, off, NO_STUDY.state_errors, NO_STUDY.cost_errors)
 
 
-def study_integration(params: SingleShootingParams, plan: Plan) -> Resumable[Study]:
+def study_integration(params: SingleShootingParams, plan: ShootingPlan) -> Resumable[AccuracyStudy]:
     """Of the plan's controls: errors over M, zero where a rollout diverges."""
 
     def run(M: int, integrator: str, form: CostForm) -> tuple[np.ndarray, float]:
@@ -88,7 +90,7 @@ def study_integration(params: SingleShootingParams, plan: Plan) -> Resumable[Stu
         costs = [run(M, params.integrator, form)[1] for form in FORMS]
         cost_errors.append(np.abs(np.array(costs) - J) / abs(J or 1.0))
     errors = [np.where(np.isfinite(e), e, 0.0) for e in (state_errors, cost_errors)]
-    return Study(NO_STUDY.gradient_errors, 0.0, errors[0], errors[1])
+    return AccuracyStudy(NO_STUDY.gradient_errors, 0.0, errors[0], errors[1])
 
 
 def _time_gradients(params: SingleShootingParams, N: int) -> Resumable[np.ndarray]:

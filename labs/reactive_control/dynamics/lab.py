@@ -43,7 +43,7 @@ class DynamicsState(State):
     """(TRAIL_POINTS, 3) [m] where the end-effector was, the newest last."""
 
 
-class Dynamics(Lab[DynamicsParams, DynamicsState]):
+class ArmDynamics(Lab[DynamicsParams, DynamicsState]):
     """An arm moved by its torques, its gravity and a force."""
 
     title = "Dynamics"

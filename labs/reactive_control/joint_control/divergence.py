@@ -13,12 +13,12 @@ from labs.reactive_control.joint_control.sampled_stability import (
     GROWTH_TOLERANCE,
     Diagnosis,
     LinearLoop,
-    LoopSettings,
+    LoopParameters,
 )
 
 
 def explain(
-    loops: Sequence[LinearLoop], settings: LoopSettings, available: AvailableSettings
+    loops: Sequence[LinearLoop], settings: LoopParameters, available: AvailableSettings
 ) -> str:
     """Why the loop diverged near its reference, and what to change, in some sentences. `loops`
     are at postures of the reference, the present one first."""
@@ -27,7 +27,7 @@ def explain(
     return " ".join(filter(None, (_why(settings, diagnosis), _sentence(advice, diagnosis))))
 
 
-def _why(settings: LoopSettings, diagnosis: Diagnosis) -> str:
+def _why(settings: LoopParameters, diagnosis: Diagnosis) -> str:
     period, step = milliseconds(settings.period), milliseconds(settings.step)
     method = INTEGRATORS[settings.integrator].title
     simulated = f"grows as exp({diagnosis.simulated:.3g} t)"

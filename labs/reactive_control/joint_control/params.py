@@ -5,7 +5,7 @@ from labs.algorithms.joint_control import Gains
 from labs.params import Group, Params
 from labs.reactive_control.joint_control.references import cycles_per_second
 from labs.reactive_control.joint_control.remedies import AvailableSettings
-from labs.reactive_control.joint_control.sampled_stability import LoopSettings
+from labs.reactive_control.joint_control.sampled_stability import LoopParameters
 from labs.tasks.arm.params import robot_choice
 from labs.tasks.arm.postures import POSED_ARMS
 
@@ -139,8 +139,8 @@ class JointParams(Params):
         return self.controller == "pid" and self.ki > 0.0
 
     @property
-    def loop_settings(self) -> LoopSettings:
+    def loop_settings(self) -> LoopParameters:
         """The loop, for the analysis of its stability."""
-        return LoopSettings(
+        return LoopParameters(
             self.controller, self.gains, self.control_period, self.integrator, self.step
         )

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from labs.plots import Curves, Line, Readout, TimeSeries, Trace
-from labs.reactive_control.joint_control.sampled_stability import LinearLoop, LoopSettings
+from labs.reactive_control.joint_control.sampled_stability import LinearLoop, LoopParameters
 
 PLOTS = (
     TimeSeries("Position", "rad", Line("q", "q"), Line("q_ref", "q^{ref}", "dash"), select="joint"),
@@ -42,7 +42,7 @@ PLOTS = (
 )
 
 
-def eigenvalue_fields(loop: LinearLoop, settings: LoopSettings) -> Mapping[str, np.ndarray]:
+def eigenvalue_fields(loop: LinearLoop, settings: LoopParameters) -> Mapping[str, np.ndarray]:
     """Of the loop under continuous control, and of one control period as simulated."""
     poles, multipliers = loop.poles(settings), loop.multipliers(settings)
     return {

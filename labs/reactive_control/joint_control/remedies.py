@@ -17,7 +17,7 @@ from labs.reactive_control.joint_control.sampled_control import milliseconds
 from labs.reactive_control.joint_control.sampled_stability import (
     GROWTH_TOLERANCE,
     LinearLoop,
-    LoopSettings,
+    LoopParameters,
 )
 
 BISECTIONS = 6
@@ -51,12 +51,12 @@ class Remedy:
     """A change that makes the loop stable near its reference, as it is worded."""
 
     text: str
-    settings: tuple[LoopSettings, ...]
+    settings: tuple[LoopParameters, ...]
     """The loop with it; where the text names a range, at both of its ends."""
 
 
 def find_remedies(
-    loops: Sequence[LinearLoop], settings: LoopSettings, available: AvailableSettings
+    loops: Sequence[LinearLoop], settings: LoopParameters, available: AvailableSettings
 ) -> list[Remedy]:
     """What helps: stable near the reference with a margin, the one that goes to the
     root first."""
@@ -73,7 +73,7 @@ def find_remedies(
     return found[:MOST_REMEDIES]
 
 
-def robustly_stable(loops: Sequence[LinearLoop], settings: LoopSettings) -> bool:
+def robustly_stable(loops: Sequence[LinearLoop], settings: LoopParameters) -> bool:
     """Whether the simulated loop rests near all postures and is stable there with all gains
     MARGIN off, and the integrator does not blow up the robot alone, which is what is left of the
     loop while a motor gives all it can."""
@@ -88,7 +88,7 @@ def robustly_stable(loops: Sequence[LinearLoop], settings: LoopSettings) -> bool
 
 
 def _shorter_period(
-    loops: Sequence[LinearLoop], settings: LoopSettings, available: AvailableSettings
+    loops: Sequence[LinearLoop], settings: LoopParameters, available: AvailableSettings
 ) -> Iterator[Remedy]:
     """The longest shorter control period that is stable."""
     for period in sorted(
@@ -101,7 +101,7 @@ def _shorter_period(
 
 
 def _shorter_step(
-    loops: Sequence[LinearLoop], settings: LoopSettings, available: AvailableSettings
+    loops: Sequence[LinearLoop], settings: LoopParameters, available: AvailableSettings
 ) -> Iterator[Remedy]:
     """The longest shorter step that is stable."""
     for step in sorted((h for h in available.steps if h < settings.step), reverse=True):
@@ -112,7 +112,7 @@ def _shorter_step(
 
 
 def _other_integrator(
-    loops: Sequence[LinearLoop], settings: LoopSettings, available: AvailableSettings
+    loops: Sequence[LinearLoop], settings: LoopParameters, available: AvailableSettings
 ) -> Iterator[Remedy]:
     """The cheapest other integrator that is stable with this step."""
     for name in ("semi-implicit-euler", "midpoint", "rk4"):
@@ -123,21 +123,21 @@ def _other_integrator(
 
 
 def _other_damping(
-    loops: Sequence[LinearLoop], settings: LoopSettings, available: AvailableSettings
+    loops: Sequence[LinearLoop], settings: LoopParameters, available: AvailableSettings
 ) -> Iterator[Remedy]:
     """The stable range of k_d nearest to the present one."""
     return _nearest_range(loops, settings, "kd", available.highest_kd)
 
 
 def _other_stiffness(
-    loops: Sequence[LinearLoop], settings: LoopSettings, available: AvailableSettings
+    loops: Sequence[LinearLoop], settings: LoopParameters, available: AvailableSettings
 ) -> Iterator[Remedy]:
     """The stable range of k_p nearest to the present one."""
     return _nearest_range(loops, settings, "kp", available.highest_kp)
 
 
 def _less_integral(
-    loops: Sequence[LinearLoop], settings: LoopSettings, available: AvailableSettings
+    loops: Sequence[LinearLoop], settings: LoopParameters, available: AvailableSettings
 ) -> Iterator[Remedy]:
     """The smallest stable k_i, and all up to the first that is not."""
     ki = settings.gains.ki
@@ -147,7 +147,7 @@ def _less_integral(
 
 
 def _feedback(
-    loops: Sequence[LinearLoop], settings: LoopSettings, available: AvailableSettings
+    loops: Sequence[LinearLoop], settings: LoopParameters, available: AvailableSettings
 ) -> Iterator[Remedy]:
     """PD with gravity compensation instead of no feedback at all."""
     change = replace(settings, controller="pd-gravity")
@@ -156,7 +156,7 @@ def _feedback(
 
 
 def _other_gains(
-    loops: Sequence[LinearLoop], settings: LoopSettings, available: AvailableSettings
+    loops: Sequence[LinearLoop], settings: LoopParameters, available: AvailableSettings
 ) -> Iterator[Remedy]:
     """k_p and k_d together, the stable pair nearest to the present one; without k_i where that
     is needed, and with gravity compensation where there was no feedback."""
@@ -179,7 +179,7 @@ def _other_gains(
 
 
 def _nearest_range(
-    loops: Sequence[LinearLoop], settings: LoopSettings, gain: str, highest: float
+    loops: Sequence[LinearLoop], settings: LoopParameters, gain: str, highest: float
 ) -> Iterator[Remedy]:
     """Of a gain from 0 to `highest`: the stable range nearest to the present value."""
     if settings.controller != "open-loop":
@@ -191,7 +191,7 @@ def _nearest_range(
 
 def _first_range(
     loops: Sequence[LinearLoop],
-    settings: LoopSettings,
+    settings: LoopParameters,
     gain: str,
     tried: np.ndarray,
     order: Iterable[int],
@@ -200,7 +200,7 @@ def _first_range(
     this order. Its ends are found by bisection and rounded inward to two digits; they and every
     value of `tried` between are stable."""
 
-    def changed(value: float) -> LoopSettings:
+    def changed(value: float) -> LoopParameters:
         return replace(settings, gains=replace(settings.gains, **{gain: float(value)}))
 
     def accepted(value: float) -> bool:

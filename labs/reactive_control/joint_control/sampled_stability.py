@@ -67,7 +67,7 @@ class LinearisedRobot:
 
 
 @dataclass(frozen=True)
-class LoopSettings:
+class LoopParameters:
     """What a loop consists of, besides the robot. Times in seconds."""
 
     controller: str
@@ -103,12 +103,12 @@ class LinearLoop:
     data: pin.Data
     q: np.ndarray
 
-    def poles(self, settings: LoopSettings) -> np.ndarray:
+    def poles(self, settings: LoopParameters) -> np.ndarray:
         """Eigenvalues [1/s] of the loop under continuous control."""
         a, b = self.robot.dynamics()
         return np.linalg.eigvals(self._closed(settings, a, b, 1.0, sampled=False))
 
-    def multipliers(self, settings: LoopSettings, *, exact: bool = False) -> np.ndarray:
+    def multipliers(self, settings: LoopParameters, *, exact: bool = False) -> np.ndarray:
         """Eigenvalues of the map over one control period, the robot's motion between ticks
         integrated as set, or exactly."""
         a, b = self.robot.dynamics()
@@ -121,12 +121,12 @@ class LinearLoop:
         )
         return np.linalg.eigvals(self._closed(settings, phi, gamma, settings.period, sampled=True))
 
-    def growth(self, settings: LoopSettings, *, exact: bool = False) -> float:
+    def growth(self, settings: LoopParameters, *, exact: bool = False) -> float:
         """sigma [1/s] of the sampled loop."""
         radius = float(np.abs(self.multipliers(settings, exact=exact)).max())
         return float(np.log(max(radius, 1e-300))) / settings.period
 
-    def sag(self, settings: LoopSettings) -> float:
+    def sag(self, settings: LoopParameters) -> float:
         """[rad] how far from q a joint comes to rest: what the law's torque at q lacks of the
         load, over the stiffness, (K_q + G) dq = tau - g. None with an integral; infinite without
         any stiffness."""
@@ -141,7 +141,7 @@ class LinearLoop:
             return np.inf
         return float(np.abs(np.linalg.solve(stiffness, lacking)).max())
 
-    def diagnose(self, settings: LoopSettings) -> Diagnosis:
+    def diagnose(self, settings: LoopParameters) -> Diagnosis:
         """Which of the three loops is the first to be at fault."""
         continuous = float(self.poles(settings).real.max())
         sampled, simulated = self.growth(settings, exact=True), self.growth(settings)
@@ -155,7 +155,7 @@ class LinearLoop:
 
     def _closed(
         self,
-        settings: LoopSettings,
+        settings: LoopParameters,
         phi: np.ndarray,
         gamma: np.ndarray,
         period: float,

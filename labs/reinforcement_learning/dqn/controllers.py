@@ -12,7 +12,7 @@ from scipy.linalg import solve_continuous_are
 
 from labs.algorithms.dqn import choose
 from labs.reinforcement_learning.dqn.optimal_table import best_controls
-from labs.reinforcement_learning.dqn.tasks import LearningTask, learning_task
+from labs.reinforcement_learning.dqn.tasks import RobotTask, learning_task
 
 Controller = Callable[[np.ndarray], np.ndarray]
 CONTROLLERS = {
@@ -28,7 +28,7 @@ NO_LUCK = np.ones(4, np.uint64)
 """A greedy policy draws nothing."""
 
 
-def network_controller(task: LearningTask, sizes: np.ndarray, w: np.ndarray) -> Controller:
+def network_controller(task: RobotTask, sizes: np.ndarray, w: np.ndarray) -> Controller:
     """u = argmin_u Q(x, u, w)"""
     return lambda X: task.torques[choose(sizes, w, task.robot.observe(X), 0.0, NO_LUCK)]
 
@@ -68,7 +68,7 @@ def energy_controller() -> Controller:
     return torque
 
 
-def mean_cost(task: LearningTask, controller: Controller, X: np.ndarray) -> float:
+def mean_cost(task: RobotTask, controller: Controller, X: np.ndarray) -> float:
     """Of an episode, undiscounted, from each of X (k, nx)."""
     total = 0.0
     for _ in range(task.robot.horizon):

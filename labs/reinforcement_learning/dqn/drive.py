@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labs.reinforcement_learning.dqn.controllers import Controller
-from labs.reinforcement_learning.dqn.tasks import LearningTask
+from labs.reinforcement_learning.dqn.tasks import RobotTask
 
 PATH = 320
 """Parts of steps whose states are kept: 4 s."""
@@ -25,12 +25,12 @@ class Drive:
     """Parts of the step done; 0: a decision is due."""
 
 
-def begin(task: LearningTask) -> Drive:
+def begin(task: RobotTask) -> Drive:
     """At rest, before the first decision."""
     return Drive(task.home, task.home[None], np.zeros(task.torques.shape[1]))
 
 
-def drive(task: LearningTask, controller: Controller, at: Drive) -> Drive:
+def drive(task: RobotTask, controller: Controller, at: Drive) -> Drive:
     """A part of a step later."""
     if at.clock == 0:
         at = replace(at, torque=controller(at.x[None])[0])
@@ -39,7 +39,7 @@ def drive(task: LearningTask, controller: Controller, at: Drive) -> Drive:
     return replace(at, x=x, path=path, clock=(at.clock + 1) % task.robot.substeps)
 
 
-def push(task: LearningTask, at: Drive, change: float) -> Drive:
+def push(task: RobotTask, at: Drive, change: float) -> Drive:
     """With a first joint that is faster by so much [rad/s]."""
     x = at.x.copy()
     x[task.joints] += change

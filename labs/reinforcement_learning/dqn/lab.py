@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from labs.algorithms import dqn
+from labs.arrays import Training
 from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
 from labs.reinforcement_learning.dqn.controllers import (
@@ -22,7 +23,6 @@ from labs.reinforcement_learning.dqn.picture import draw_learned, draw_target
 from labs.reinforcement_learning.dqn.plots import PLOTS, curves, maps, table_map, value_map
 from labs.reinforcement_learning.dqn.tasks import learning_task, posture_at
 from labs.reinforcement_learning.dqn.training import (
-    Training,
     agent_of,
     initial_training,
     sound,

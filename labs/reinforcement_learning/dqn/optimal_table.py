@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 
 from labs.compiled import compiled
-from labs.reinforcement_learning.dqn.tasks import LearningTask, learning_task
+from labs.reinforcement_learning.dqn.tasks import RobotTask, learning_task
 
 ANGLES, VELOCITIES = 121, 121
 GAMMA, SWEEPS = 0.99, 400
@@ -36,7 +36,7 @@ def _costs_ahead(X: np.ndarray) -> np.ndarray:
     ])  # fmt: skip
 
 
-def _moves(task: LearningTask, X: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+def _moves(task: RobotTask, X: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     """For every control where it leads from X (k, 2), and at what cost."""
     controls = range(task.robot.control_count)
     return [task.robot.step(X, np.full(len(X), u))[:2] for u in controls]
@@ -55,7 +55,7 @@ def _values() -> np.ndarray:
     return _iterate(costs, *(np.stack(parts) for parts in zip(*places, strict=True)))
 
 
-def _coordinates(task: LearningTask, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _coordinates(task: RobotTask, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Of states (k, 2), in nodes of the table."""
     velocity = (X[:, 1] / task.reach[1] + 1.0) * 0.5 * (VELOCITIES - 1)
     return X[:, 0] % (2 * np.pi) / (2 * np.pi) * ANGLES, velocity

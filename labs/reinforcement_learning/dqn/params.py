@@ -5,7 +5,7 @@ from typing import Any
 from labs.algorithms.dqn import DqnOptions
 from labs.params import Group, Params
 from labs.reinforcement_learning.dqn.controllers import CONTROLLERS
-from labs.reinforcement_learning.dqn.tasks import TITLES, LearningTask, learning_task
+from labs.reinforcement_learning.dqn.tasks import TITLES, RobotTask, learning_task
 
 WORLD = Group("World", effect="restart")
 NETWORK = Group("Network", effect="restart")
@@ -95,7 +95,7 @@ class DqnParams(Params):
     """Which of those who learn side by side is shown."""
 
     @property
-    def task(self) -> LearningTask:
+    def task(self) -> RobotTask:
         """What is to be learned."""
         return learning_task(self.system)
 

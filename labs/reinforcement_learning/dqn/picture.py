@@ -5,7 +5,7 @@ import numpy as np
 
 from labs.colors import sequential
 from labs.reinforcement_learning.dqn.drive import Drive
-from labs.reinforcement_learning.dqn.tasks import LearningTask, posture_at
+from labs.reinforcement_learning.dqn.tasks import RobotTask, posture_at
 from labs.scene import Scene
 from labs.tasks.environments.reach import reach
 
@@ -20,7 +20,7 @@ ABOVE = 0.015
 
 
 def draw_learned(
-    scene: Scene, task: LearningTask, value: np.ndarray, policy: np.ndarray, at: Drive
+    scene: Scene, task: RobotTask, value: np.ndarray, policy: np.ndarray, at: Drive
 ) -> None:
     """`value` and `policy` as `plots.value_map` has them."""
     scene.camera(*task.camera)
@@ -43,7 +43,7 @@ def draw_learned(
 
 
 def _draw_policy(
-    scene: Scene, task: LearningTask, nodes: np.ndarray, heights: np.ndarray, policy: np.ndarray
+    scene: Scene, task: RobotTask, nodes: np.ndarray, heights: np.ndarray, policy: np.ndarray
 ) -> None:
     some = (slice(1, None, EVERY),) * 2
     starts = _place(task, nodes[some], heights[some] + ABOVE).reshape(-1, 3)
@@ -52,7 +52,7 @@ def _draw_policy(
     scene.arrows("policy", starts, ends, "muted")
 
 
-def _place(task: LearningTask, at: np.ndarray, heights: np.ndarray) -> np.ndarray:
+def _place(task: RobotTask, at: np.ndarray, heights: np.ndarray) -> np.ndarray:
     """(..., 3) [m] of places (..., 2) on the map, `heights` (...) above the floor."""
     (x, y, floor), size = task.relief
     x = x - 0.5 * size * SIZE[1] * at[..., 1] / task.reach[1]
@@ -60,7 +60,7 @@ def _place(task: LearningTask, at: np.ndarray, heights: np.ndarray) -> np.ndarra
     return np.stack([x, y, floor + heights], axis=-1)
 
 
-def _height_at(task: LearningTask, heights: np.ndarray, at: np.ndarray) -> np.ndarray:
+def _height_at(task: RobotTask, heights: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Of the relief at places (k, 2), by the nearest node."""
     rows, columns = heights.shape
     i = np.rint((at[:, 1] / task.reach[1] + 1.0) * 0.5 * (rows - 1)).astype(int)
@@ -68,7 +68,7 @@ def _height_at(task: LearningTask, heights: np.ndarray, at: np.ndarray) -> np.nd
     return np.asarray(heights[i, j])
 
 
-def draw_target(scene: Scene, task: LearningTask, at: Drive, x: float, z: float) -> None:
+def draw_target(scene: Scene, task: RobotTask, at: Drive, x: float, z: float) -> None:
     """The ball to drag, and where the tip goes: the nearest place within reach."""
     tip = reach().tips(posture_at(x, z)[None])[0]
     scene.handle("target", (x, tip[1], z), 0.05)

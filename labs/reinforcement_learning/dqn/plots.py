@@ -5,10 +5,11 @@ from functools import cache
 import numpy as np
 
 from labs.algorithms.dqn import q_values
+from labs.arrays import Training
 from labs.plots import Curves, HeatMap, Line, Plot, Readout, TimeSeries, Trace
 from labs.reinforcement_learning.dqn.optimal_table import best_controls, least_costs
-from labs.reinforcement_learning.dqn.tasks import LearningTask, learning_task
-from labs.reinforcement_learning.dqn.training import UNKNOWN, Training
+from labs.reinforcement_learning.dqn.tasks import RobotTask, learning_task
+from labs.reinforcement_learning.dqn.training import UNKNOWN
 
 ARROWS = 3
 """Every so many nodes of a map has one."""
@@ -68,7 +69,7 @@ PLOTS: tuple[Plot, ...] = (
 
 
 def value_map(
-    task: LearningTask, sizes: np.ndarray, w: np.ndarray, x: np.ndarray
+    task: RobotTask, sizes: np.ndarray, w: np.ndarray, x: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """min Q in the task's units of cost and argmin Q, (NODES, NODES), rows along the second
     coordinate, through the state x (nx,)."""
@@ -84,18 +85,18 @@ def table_map() -> tuple[np.ndarray, np.ndarray]:
     return _on_map(task, least_costs(X)), _on_map(task, best_controls(X))
 
 
-def _nodes(task: LearningTask, x: np.ndarray) -> np.ndarray:
+def _nodes(task: RobotTask, x: np.ndarray) -> np.ndarray:
     base = task.base.copy()
     base[4:] = x[4:] if task.name == "ur5" else base[4:]
     return task.nodes(base)
 
 
-def _on_map(task: LearningTask, values: np.ndarray) -> np.ndarray:
+def _on_map(task: RobotTask, values: np.ndarray) -> np.ndarray:
     return values.reshape(len(task.axis(1)), len(task.axis(0)))
 
 
 def maps(
-    task: LearningTask, training: Training, s: int, shown: tuple[np.ndarray, np.ndarray]
+    task: RobotTask, training: Training, s: int, shown: tuple[np.ndarray, np.ndarray]
 ) -> dict[str, np.ndarray]:
     """Values and policy `shown`, as `value_map` has them, and the buffer of learner s."""
     value, policy = shown
@@ -109,7 +110,7 @@ def maps(
     }
 
 
-def _held(task: LearningTask, training: Training, s: int) -> np.ndarray:
+def _held(task: RobotTask, training: Training, s: int) -> np.ndarray:
     """How many states of the buffer are near each node."""
     known = min(int(training["stored"][s, 0]), training["observations"].shape[1])
     at = task.seen(training["observations"][s, :known])

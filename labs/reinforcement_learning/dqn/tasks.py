@@ -21,7 +21,7 @@ TESTS = 12
 
 
 @dataclass(frozen=True, eq=False)
-class LearningTask:
+class RobotTask:
     """A robot to learn with, and what shows it."""
 
     name: str
@@ -93,7 +93,7 @@ class LearningTask:
 
 
 @cache
-def learning_task(name: str) -> LearningTask:
+def learning_task(name: str) -> RobotTask:
     """The one of this name, a key of TITLES."""
     if name == "ur5":
         return _reaching()
@@ -101,7 +101,7 @@ def learning_task(name: str) -> LearningTask:
     n = environment.mechanism.nq
     goal = np.concatenate([environment.goal, np.zeros(n)])
     fastest = environment.velocity_limit[0]
-    return LearningTask(
+    return RobotTask(
         name,
         environment,
         hanging(n, (0.0, -0.8 * n), BLUE),
@@ -119,11 +119,11 @@ def learning_task(name: str) -> LearningTask:
     )
 
 
-def _reaching() -> LearningTask:
+def _reaching() -> RobotTask:
     environment, arm = reach(), load("ur5")
     middle = RANGES.mean(axis=1)
     base = np.concatenate([middle, np.zeros(2), middle])
-    return LearningTask(
+    return RobotTask(
         "ur5",
         environment,
         arm,

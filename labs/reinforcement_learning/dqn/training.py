@@ -14,7 +14,6 @@ arrays, S learners in front:
     loss, td_error, gradient_norm (S, k)
 """
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -23,10 +22,10 @@ from labs.algorithms import dqn
 from labs.algorithms.dqn import DqnAgent, DqnOptions, choose, q_values
 from labs.algorithms.network import Adam
 from labs.algorithms.replay import Replay
-from labs.reinforcement_learning.dqn.tasks import LearningTask
+from labs.arrays import Training
+from labs.reinforcement_learning.dqn.tasks import RobotTask
 from labs.resumable import Resumable
 
-Training = Mapping[str, np.ndarray]
 ROUNDS, UPDATES = 20, 24
 """Of the sixteen robots in an iteration; and the most updates in a piece of it: milliseconds."""
 TRY_EVERY = 5
@@ -44,7 +43,7 @@ NUMBERS = ("steps", "updates", *OF_UPDATE)
 
 
 def initial_training(
-    task: LearningTask, network: dict[str, Any], learners: int, rng: np.random.Generator
+    task: RobotTask, network: dict[str, Any], learners: int, rng: np.random.Generator
 ) -> Training:
     """Nothing learned yet."""
     agents = [dqn.init(task.robot, rng=rng, **network) for _ in range(learners)]
@@ -66,7 +65,7 @@ def agent_of(training: Training, s: int) -> DqnAgent:
     return DqnAgent(sizes=training["sizes"], adam=adam, replay=replay, **parts, **numbers)
 
 
-def train(task: LearningTask, options: DqnOptions, training: Training) -> Resumable[Training]:
+def train(task: RobotTask, options: DqnOptions, training: Training) -> Resumable[Training]:
     """Another iteration of all learners."""
     agents, recent = [], training["recent"].copy()
     for s in range(len(training["w"])):
@@ -117,7 +116,7 @@ def _recorded(
 
 
 def _trial(
-    task: LearningTask, options: DqnOptions, agent: DqnAgent
+    task: RobotTask, options: DqnOptions, agent: DqnAgent
 ) -> Resumable[tuple[float, float, float]]:
     """What TRIAL names, on average over the test's starts; pauses every fifty steps."""
     robot, X, total, discounted = task.robot, task.tests(), 0.0, 0.0

@@ -65,7 +65,7 @@ class Iterates:
     count: np.ndarray
     """(4,) sweeps."""
     evaluations: np.ndarray
-    """(4,) as in `Sweep`."""
+    """(4,) as in `bellman.Sweep`."""
     errors: np.ndarray
     """(k + 1, 4) distance to the limit after 0, 1, ..., k sweeps; its last value where an
     iteration ended earlier, 0 where it never began."""

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from labs.arrays import Training
 from labs.reinforcement_learning.function_approximation import nine, spiral, triad
 from labs.reinforcement_learning.function_approximation.board_picture import draw_board
 from labs.reinforcement_learning.function_approximation.graph_picture import (
@@ -10,7 +11,7 @@ from labs.reinforcement_learning.function_approximation.graph_picture import (
     pair_places,
     star_places,
 )
-from labs.reinforcement_learning.function_approximation.motion import Motion, hop
+from labs.reinforcement_learning.function_approximation.motion import PolicyMotion, hop
 from labs.reinforcement_learning.function_approximation.params import ApproximationParams
 from labs.reinforcement_learning.function_approximation.plots import (
     COLUMNS,
@@ -18,7 +19,7 @@ from labs.reinforcement_learning.function_approximation.plots import (
     ROWS,
     spread,
 )
-from labs.reinforcement_learning.function_approximation.subject import Fields, Training
+from labs.reinforcement_learning.function_approximation.subject import Fields
 from labs.resumable import Resumable
 from labs.scene import Color, Scene
 
@@ -51,11 +52,13 @@ class Triad:
         found |= {"real": values.real, "imaginary": values.imag}
         return found | spread("error", training["error"])
 
-    def move(self, params: ApproximationParams, training: Training, motion: Motion) -> Motion:
+    def move(
+        self, params: ApproximationParams, training: Training, motion: PolicyMotion
+    ) -> PolicyMotion:
         return hop(triad.example(params).task, motion)
 
     def draw(
-        self, scene: Scene, params: ApproximationParams, training: Training, motion: Motion
+        self, scene: Scene, params: ApproximationParams, training: Training, motion: PolicyMotion
     ) -> None:
         values = triad.example(params).features.dense @ training["w"][params.shown]
         star = params.world == "star"
@@ -89,11 +92,13 @@ class Spiral:
         found |= {"way_x": way_x, "way_y": way_y}
         return found | spread("error", training["error"])
 
-    def move(self, params: ApproximationParams, training: Training, motion: Motion) -> Motion:
+    def move(
+        self, params: ApproximationParams, training: Training, motion: PolicyMotion
+    ) -> PolicyMotion:
         return motion
 
     def draw(
-        self, scene: Scene, params: ApproximationParams, training: Training, motion: Motion
+        self, scene: Scene, params: ApproximationParams, training: Training, motion: PolicyMotion
     ) -> None:
         draw_spiral(scene, training["path"][params.shown])
 
@@ -116,11 +121,13 @@ class Nine:
             found[f"distance_{column}"] = training["distance"][c::3].T
         return found | {"changes": training["changes"][OTHER_CELLS].T}
 
-    def move(self, params: ApproximationParams, training: Training, motion: Motion) -> Motion:
+    def move(
+        self, params: ApproximationParams, training: Training, motion: PolicyMotion
+    ) -> PolicyMotion:
         return motion
 
     def draw(
-        self, scene: Scene, params: ApproximationParams, training: Training, motion: Motion
+        self, scene: Scene, params: ApproximationParams, training: Training, motion: PolicyMotion
     ) -> None:
         steps = training["steps"]
         time = np.log(np.maximum(steps, 1.0)) / np.log(nine.EPISODES)

@@ -4,6 +4,7 @@ import numpy as np
 
 from labs.algorithms.features import Features
 from labs.algorithms.linear_control import q_table
+from labs.arrays import Training
 from labs.reinforcement_learning.function_approximation import prediction, swing_up
 from labs.reinforcement_learning.function_approximation.given_policy import (
     GAMMA,
@@ -12,7 +13,7 @@ from labs.reinforcement_learning.function_approximation.given_policy import (
 )
 from labs.reinforcement_learning.function_approximation.line_picture import draw_line
 from labs.reinforcement_learning.function_approximation.motion import (
-    Motion,
+    PolicyMotion,
     hop,
     swing_by,
     swing_until_caught,
@@ -23,7 +24,7 @@ from labs.reinforcement_learning.function_approximation.params import (
 )
 from labs.reinforcement_learning.function_approximation.plots import over_all, spread
 from labs.reinforcement_learning.function_approximation.prediction import given_policy
-from labs.reinforcement_learning.function_approximation.subject import Fields, Training
+from labs.reinforcement_learning.function_approximation.subject import Fields
 from labs.reinforcement_learning.function_approximation.swing_up import (
     HANGING,
     features_of,
@@ -81,7 +82,9 @@ class Predicted:
             | {"features": _some_features(given.features)[inside]}
         )
 
-    def move(self, params: ApproximationParams, training: Training, motion: Motion) -> Motion:
+    def move(
+        self, params: ApproximationParams, training: Training, motion: PolicyMotion
+    ) -> PolicyMotion:
         given = given_policy(params)
         if params.world == "walk":
             return hop(given.task, motion)
@@ -89,7 +92,7 @@ class Predicted:
         return swing_until_caught(PENDULUM, given.mdp, given.policy, starts, motion)
 
     def draw(
-        self, scene: Scene, params: ApproximationParams, training: Training, motion: Motion
+        self, scene: Scene, params: ApproximationParams, training: Training, motion: PolicyMotion
     ) -> None:
         given = given_policy(params)
         if params.world == "surface":
@@ -102,7 +105,7 @@ class Predicted:
         draw_line(scene, given.task.truth[1:-1], estimates, params.shown, features, place)
 
 
-class SwingUp:
+class SwingUpLearner:
     """The pendulum that learns to swing up."""
 
     def begin(self, params: ApproximationParams, rng: np.random.Generator) -> Training:
@@ -129,7 +132,9 @@ class SwingUp:
         everywhere = np.ones(PENDULUM.X, bool)
         return found | {"policy": torque_arrows(PENDULUM, q.argmin(axis=1), everywhere)}
 
-    def move(self, params: ApproximationParams, training: Training, motion: Motion) -> Motion:
+    def move(
+        self, params: ApproximationParams, training: Training, motion: PolicyMotion
+    ) -> PolicyMotion:
         def greedy() -> np.ndarray:
             q = q_table(features_of(params), training["w"][params.shown])
             return np.asarray(q.argmin(axis=1))
@@ -137,7 +142,7 @@ class SwingUp:
         return swing_by(PENDULUM, swing_task()[0], greedy, motion)
 
     def draw(
-        self, scene: Scene, params: ApproximationParams, training: Training, motion: Motion
+        self, scene: Scene, params: ApproximationParams, training: Training, motion: PolicyMotion
     ) -> None:
         q = q_table(features_of(params), training["w"][params.shown])
         truth, v = swing_task()[2].min(axis=1), q.min(axis=1)
@@ -179,7 +184,7 @@ def _draw_relief(
     v: np.ndarray,
     truth: np.ndarray,
     policy: np.ndarray | None,
-    motion: Motion,
+    motion: PolicyMotion,
 ) -> None:
     high = float(truth.max())
     phi = _feature(params, features)

@@ -6,24 +6,28 @@ from typing import ClassVar
 
 import numpy as np
 
+from labs.arrays import Training
 from labs.lab import Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
 from labs.random_numbers import seeded
 from labs.reinforcement_learning.function_approximation.example_worlds import Nine, Spiral, Triad
-from labs.reinforcement_learning.function_approximation.fitted_worlds import Predicted, SwingUp
-from labs.reinforcement_learning.function_approximation.motion import PERIOD, Motion, at_rest
+from labs.reinforcement_learning.function_approximation.fitted_worlds import (
+    Predicted,
+    SwingUpLearner,
+)
+from labs.reinforcement_learning.function_approximation.motion import PERIOD, PolicyMotion, at_rest
 from labs.reinforcement_learning.function_approximation.params import (
     ITERATIONS,
     ApproximationParams,
 )
 from labs.reinforcement_learning.function_approximation.plots import PLOTS
-from labs.reinforcement_learning.function_approximation.subject import Subject, Training
+from labs.reinforcement_learning.function_approximation.subject import Subject
 from labs.scene import Scene
 
 SUBJECTS: Mapping[str, Subject] = {
     "walk": Predicted(),
     "surface": Predicted(),
-    "swing": SwingUp(),
+    "swing": SwingUpLearner(),
     "star": Triad(),
     "pair": Triad(),
     "spiral": Spiral(),
@@ -36,7 +40,7 @@ class ApproximationState(State):
     """What was learned, and what moves meanwhile."""
 
     training: Training
-    motion: Motion
+    motion: PolicyMotion
 
 
 class FunctionApproximation(Lab[ApproximationParams, ApproximationState]):

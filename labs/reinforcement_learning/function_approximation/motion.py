@@ -20,7 +20,7 @@ LONGEST, REST = 80, 10
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class PolicyMotion:
     """Its arrays are never written into."""
 
     place: int
@@ -33,12 +33,12 @@ class Motion:
     """Periods since the walker's last step."""
 
 
-def at_rest(random: np.ndarray) -> Motion:
+def at_rest(random: np.ndarray) -> PolicyMotion:
     """Before anything moves."""
-    return Motion(-1, start_swing(), random)
+    return PolicyMotion(-1, start_swing(), random)
 
 
-def hop(task: PredictionTask, motion: Motion) -> Motion:
+def hop(task: PredictionTask, motion: PolicyMotion) -> PolicyMotion:
     """A period later: a step of the policy that is followed, every now and then."""
     if motion.place >= 0 and motion.clock + 1 < HOP:
         return replace(motion, clock=motion.clock + 1)
@@ -52,8 +52,8 @@ def hop(task: PredictionTask, motion: Motion) -> Motion:
 
 
 def swing_by(
-    grid: PendulumGrid, mdp: FiniteMDP, policy: Callable[[], np.ndarray], motion: Motion
-) -> Motion:
+    grid: PendulumGrid, mdp: FiniteMDP, policy: Callable[[], np.ndarray], motion: PolicyMotion
+) -> PolicyMotion:
     """A period later, from hanging at rest, torques by a policy (X,) that is asked for when due."""
     swing = motion.swing
     if swing.clock == 0:
@@ -63,8 +63,8 @@ def swing_by(
 
 
 def swing_until_caught(
-    grid: PendulumGrid, mdp: FiniteMDP, policy: np.ndarray, starts: np.ndarray, motion: Motion
-) -> Motion:
+    grid: PendulumGrid, mdp: FiniteMDP, policy: np.ndarray, starts: np.ndarray, motion: PolicyMotion
+) -> PolicyMotion:
     """The same from any of `starts` until a terminal state, where it is held for a while."""
     swing = motion.swing
     if swing.clock == 0:

@@ -24,6 +24,7 @@ from labs.algorithms import linear_control
 from labs.algorithms.exploration import FOLLOW, BehaviourPolicy
 from labs.algorithms.features import Features
 from labs.algorithms.linear_control import LinearControllers, q_table
+from labs.arrays import Training
 from labs.problems.episodes import EpisodicTask, UpdateRule, episodic_task
 from labs.random_numbers import seeded
 from labs.reinforcement_learning.function_approximation import rooms, spiral
@@ -32,7 +33,6 @@ from labs.reinforcement_learning.function_approximation.params import (
     ITERATIONS,
     ApproximationParams,
 )
-from labs.reinforcement_learning.function_approximation.subject import Training
 from labs.resumable import Resumable
 
 EPISODES = 20_000

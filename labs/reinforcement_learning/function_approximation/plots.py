@@ -2,18 +2,19 @@
 
 import numpy as np
 
-from labs.plots import Curves, HeatMap, Plot, Readout, Trace, When
-from labs.reinforcement_learning.function_approximation.subject import Fields, Training
+from labs.arrays import Training
+from labs.plots import Curves, HeatMap, Plot, Readout, ShownWhen, Trace
+from labs.reinforcement_learning.function_approximation.subject import Fields
 
-WALK: When = {"world": ("walk",)}
-GIVEN: When = {"world": ("walk", "surface")}
-PLANE: When = {"world": ("surface", "swing")}
-SWING: When = {"world": ("swing",)}
-FITTED: When = {"world": ("walk", "surface", "swing")}
-EXAMPLES: When = {"world": ("star", "pair", "spiral")}
-TRIAD: When = {"world": ("star", "pair")}
-SPIRAL: When = {"world": ("spiral",)}
-NINE: When = {"world": ("nine",)}
+WALK: ShownWhen = {"world": ("walk",)}
+GIVEN: ShownWhen = {"world": ("walk", "surface")}
+PLANE: ShownWhen = {"world": ("surface", "swing")}
+SWING: ShownWhen = {"world": ("swing",)}
+FITTED: ShownWhen = {"world": ("walk", "surface", "swing")}
+EXAMPLES: ShownWhen = {"world": ("star", "pair", "spiral")}
+TRIAD: ShownWhen = {"world": ("star", "pair")}
+SPIRAL: ShownWhen = {"world": ("spiral",)}
+NINE: ShownWhen = {"world": ("nine",)}
 ROWS = ("MC control", "SARSA", "Q-learning")
 COLUMNS = ("table", "linear", "nonlinear")
 AXES = ("angle from upright [rad]", "velocity [rad/s]")
@@ -22,7 +23,7 @@ OTHERS = ("MC, table", "MC, linear", "SARSA, linear", "MC, nonlinear")
 OTHER_CELLS = [0, 1, 4, 2]
 
 
-def _map(title: str, z: str, z_label: str, when: When = PLANE, arrows: str = "") -> HeatMap:
+def _map(title: str, z: str, z_label: str, when: ShownWhen = PLANE, arrows: str = "") -> HeatMap:
     return HeatMap(title, "angle", "velocity", z, *AXES, z_label, when=when, arrows=arrows)
 
 

@@ -23,12 +23,13 @@ from labs.algorithms.approximation import (
 from labs.algorithms.batch_approximation import (
     REPLAY_MC,
     REPLAY_TD,
-    Transitions,
+    TransitionBatch,
     collect_transitions,
     least_squares_fit,
     lstd,
     replay,
 )
+from labs.arrays import Training
 from labs.problems.episodes import UpdateRule
 from labs.reinforcement_learning.function_approximation.given_policy import (
     GivenPolicy,
@@ -45,7 +46,6 @@ from labs.reinforcement_learning.function_approximation.predictors import (
     arrays_of,
     predictors_of,
 )
-from labs.reinforcement_learning.function_approximation.subject import Training
 from labs.resumable import Resumable, pieces
 from labs.tasks.random_walk.walks import THOUSAND, walk_task
 
@@ -135,7 +135,7 @@ def _replayed(
     given: GivenPolicy,
     rule: UpdateRule,
     training: Training,
-    batches: list[Transitions],
+    batches: list[TransitionBatch],
 ) -> Resumable[dict[str, np.ndarray]]:
     """After as many draws as make a hundredth of the uses of all samples."""
     w, random, count = (training[name].copy() for name in ("w", "random", "count"))
@@ -154,13 +154,13 @@ def _replayed(
 
 
 @lru_cache(maxsize=2 * LEARNERS)
-def batch_of(world: str, luck: bytes, episodes: int) -> Transitions:
+def batch_of(world: str, luck: bytes, episodes: int) -> TransitionBatch:
     """What so many episodes hold, drawn by the generator `luck`."""
     task = walk_task(THOUSAND) if world == "walk" else caught_pendulum()[0]
     return collect_transitions(task, np.frombuffer(luck, np.uint64).copy(), episodes)
 
 
-def _least_squares(given: GivenPolicy, batch: Transitions, bootstraps: bool) -> np.ndarray:
+def _least_squares(given: GivenPolicy, batch: TransitionBatch, bootstraps: bool) -> np.ndarray:
     if bootstraps:
         return lstd(given.features, batch, float(given.mdp.gamma))
     return least_squares_fit(given.features, batch)

@@ -1,7 +1,8 @@
 """Learners of a value (labs/algorithms/approximation.py) as the plain arrays of a training."""
 
 from labs.algorithms.approximation import LinearPredictors
-from labs.reinforcement_learning.function_approximation.subject import Fields, Training
+from labs.arrays import Training
+from labs.reinforcement_learning.function_approximation.subject import Fields
 
 
 def arrays_of(learners: LinearPredictors) -> Fields:

@@ -25,6 +25,7 @@ A training has, besides what every one has, of S learners with one weight each:
 
 import numpy as np
 
+from labs.arrays import Training
 from labs.compiled import compiled
 from labs.problems.episodes import UpdateRule, step_size
 from labs.random_numbers import below, seeded, uniform
@@ -33,7 +34,6 @@ from labs.reinforcement_learning.function_approximation.params import (
     LEARNERS,
     ApproximationParams,
 )
-from labs.reinforcement_learning.function_approximation.subject import Training
 from labs.resumable import Resumable
 
 EPS = 0.05

@@ -6,17 +6,16 @@ A training is a mapping of arrays, complete: it holds all that goes on from ther
     sound ()           whether all weights stayed within bounds
 """
 
-from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
 
-from labs.reinforcement_learning.function_approximation.motion import Motion
+from labs.arrays import Training
+from labs.reinforcement_learning.function_approximation.motion import PolicyMotion
 from labs.reinforcement_learning.function_approximation.params import ApproximationParams
 from labs.resumable import Resumable
 from labs.scene import Scene
 
-Training = Mapping[str, np.ndarray]
 Fields = dict[str, np.ndarray]
 
 
@@ -31,7 +30,9 @@ class Subject(Protocol):
         """The training after one of ITERATIONS."""
         ...
 
-    def move(self, params: ApproximationParams, training: Training, motion: Motion) -> Motion:
+    def move(
+        self, params: ApproximationParams, training: Training, motion: PolicyMotion
+    ) -> PolicyMotion:
         """One PERIOD later."""
         ...
 
@@ -44,5 +45,5 @@ class Subject(Protocol):
         ...
 
     def draw(
-        self, scene: Scene, params: ApproximationParams, training: Training, motion: Motion
+        self, scene: Scene, params: ApproximationParams, training: Training, motion: PolicyMotion
     ) -> None: ...

@@ -17,7 +17,7 @@ import numpy as np
 
 from labs.algorithms import linear_control, policy_iteration
 from labs.algorithms.batch_approximation import (
-    Transitions,
+    TransitionBatch,
     collect_transitions,
     fitted_q_iteration,
     replay_q_learning,
@@ -27,6 +27,7 @@ from labs.algorithms.exploration import BehaviourPolicy
 from labs.algorithms.features import Features
 from labs.algorithms.linear_control import LinearControllers, q_table
 from labs.algorithms.policy_evaluation import exact
+from labs.arrays import Training
 from labs.problems.episodes import EpisodicTask, UpdateRule, episodic_task
 from labs.problems.finite_mdp import FiniteMDP, random_policy
 from labs.problems.prediction import prediction_task
@@ -38,7 +39,6 @@ from labs.reinforcement_learning.function_approximation.params import (
     LEARNERS,
     ApproximationParams,
 )
-from labs.reinforcement_learning.function_approximation.subject import Training
 from labs.resumable import Resumable, pieces
 
 HORIZON, SHORT = 100, 20
@@ -131,7 +131,7 @@ def _from_batches(
 
 
 @lru_cache(maxsize=2 * LEARNERS)
-def batch_of(luck: bytes, episodes: int) -> Transitions:
+def batch_of(luck: bytes, episodes: int) -> TransitionBatch:
     """Short episodes from anywhere, torques drawn evenly by the generator `luck`."""
     mdp = swing_task()[0]
     unknown = np.zeros(mdp.X)  # nobody asks what the random policy is worth

@@ -16,6 +16,7 @@ import numpy as np
 from labs.algorithms import approximation
 from labs.algorithms.approximation import ORACLE, SEMI_GRADIENT_TD, TDC
 from labs.algorithms.features import from_matrix
+from labs.arrays import Training
 from labs.problems.episodes import UpdateRule
 from labs.reinforcement_learning.function_approximation.counterexamples import (
     Counterexample,
@@ -31,7 +32,6 @@ from labs.reinforcement_learning.function_approximation.predictors import (
     arrays_of,
     predictors_of,
 )
-from labs.reinforcement_learning.function_approximation.subject import Training
 from labs.resumable import Resumable
 
 LIMIT = 1e6

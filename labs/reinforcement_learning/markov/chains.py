@@ -10,7 +10,7 @@ import numpy as np
 
 from labs.errors import LabError
 from labs.number_texts import parse_number, plain_text
-from labs.tasks.mdp_table.table import Table, parse_table
+from labs.tasks.mdp_table.table import MdpTable, parse_table
 
 STUDENT = """state,    cost, Lecture, Exercise, Code, Café, Phone, Sleep
 Lecture,  -1,   0,       0.6,      0,    0.1,  0.3,   0
@@ -66,7 +66,7 @@ ROW_DECIMALS = 4
 """Decimals of an edited row."""
 
 
-def chain_table(name: str, number: int, own: str) -> Table:
+def chain_table(name: str, number: int, own: str) -> MdpTable:
     """The chain of a name in TITLES: the random one of this number, or the text `own`."""
     if name == "random":
         return random_chain(RANDOM_STATES, number)
@@ -74,7 +74,7 @@ def chain_table(name: str, number: int, own: str) -> Table:
 
 
 @cache
-def random_chain(states: int, number: int) -> Table:
+def random_chain(states: int, number: int) -> MdpTable:
     """The chain of this number: from each state to the next one and to two more at random, so
     that it is irreducible; costs from -3 to 3."""
     rng = np.random.default_rng([states, number])
@@ -84,7 +84,9 @@ def random_chain(states: int, number: int) -> Table:
         P[x, rng.choice(states, 2, replace=False)] += rng.uniform(0.0, 1.0, 2)
     P /= P.sum(axis=1, keepdims=True)
     costs = rng.integers(-3, 4, size=(states, 1)).astype(float)
-    return Table(tuple(f"S{x + 1}" for x in here), ("",), P[None], costs, np.zeros_like(costs, int))
+    return MdpTable(
+        tuple(f"S{x + 1}" for x in here), ("",), P[None], costs, np.zeros_like(costs, int)
+    )
 
 
 def parse_rows(text: str) -> dict[int, np.ndarray]:

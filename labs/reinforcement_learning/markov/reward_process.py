@@ -16,7 +16,7 @@ from labs.algorithms.markov_chain import (
 )
 from labs.reinforcement_learning.markov.chains import shift_probability, with_probability, with_rows
 from labs.reinforcement_learning.markov.graph import probability_at, state_places
-from labs.tasks.mdp_table.table import Table
+from labs.tasks.mdp_table.table import MdpTable
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Edit:
 class RewardProcess:
     """<X, P, C> under a policy, and what follows from it."""
 
-    table: Table
+    table: MdpTable
     policy: np.ndarray
     """(X, U) pi(u | x)."""
     unedited: np.ndarray
@@ -87,7 +87,7 @@ class RewardProcess:
         return with_probability(self.P[x], y, p, self.unedited[x])
 
 
-def reward_process(table: Table, first: float, edit: Edit) -> RewardProcess:
+def reward_process(table: MdpTable, first: float, edit: Edit) -> RewardProcess:
     """Of the policy that in every state takes the first control with this probability; the
     others share what is left."""
     X, U = table.C.shape

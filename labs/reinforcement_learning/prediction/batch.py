@@ -14,7 +14,7 @@ The batch grows by an episode an iteration; then come the sweeps. Of S learners:
     seed ()                    of the episodes
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -28,13 +28,13 @@ from labs.algorithms.batch_prediction import (
     monte_carlo_sweep,
     td_sweep,
 )
+from labs.arrays import Training
 from labs.lab import Snapshot
 from labs.number_texts import counted
 from labs.problems.prediction import root_mean_square_error
 from labs.reinforcement_learning.prediction.params import PredictionParams
 from labs.reinforcement_learning.prediction.worlds import LEARNERS
 
-Training = Mapping[str, np.ndarray]
 A, B, GAIN = 1, 2, 3
 EPISODES = (
     ([A, B, 0], [0.0, 0.0]),

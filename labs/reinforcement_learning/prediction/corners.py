@@ -18,17 +18,17 @@ After k iterations:
     samples (k,)          episodes so far
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
 from labs.algorithms.bellman import policy_backup
+from labs.arrays import Training
 from labs.lab import Snapshot
 from labs.problems.finite_mdp import FiniteMDP
 from labs.reinforcement_learning.prediction import online
 from labs.reinforcement_learning.prediction.params import PredictionParams
 
-Training = Mapping[str, np.ndarray]
 CORNERS = ("Exhaustive search", "Dynamic programming", "Monte Carlo", "TD(0)")
 DEEPEST = 14
 """Steps of the paths of exhaustive search at most: 2^14 paths from each state."""

@@ -46,7 +46,7 @@ class PredictionState(State):
     """(4,) uint64: of the targets that are sampled to be looked at."""
 
 
-class Prediction(Lab[PredictionParams, PredictionState]):
+class PredictionLab(Lab[PredictionParams, PredictionState]):
     """Monte Carlo and TD(0) learn the value of one policy."""
 
     title = "Model-free prediction"

@@ -11,17 +11,17 @@ Of M = 2 methods with S learners each, after k batches of episodes:
                                error^2 = bias^2 + spread^2
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
 from labs.algorithms.prediction import EVERY_VISIT, FIRST_VISIT, TD0, Predictors, init, step
+from labs.arrays import Training
 from labs.lab import Snapshot
 from labs.number_texts import counted
 from labs.reinforcement_learning.prediction.params import PredictionParams
 from labs.reinforcement_learning.prediction.worlds import PredictionWorld
 
-Training = Mapping[str, np.ndarray]
 CURVES = ("error", "bias", "spread")
 BATCHES = 100
 """Iterations of a training, or more while its episodes are long."""

@@ -4,7 +4,7 @@ greedy policies of the moment from the start, over and over."""
 import numpy as np
 
 from labs.random_numbers import uniform
-from labs.reinforcement_learning.td_control.tasks import LearningTask
+from labs.reinforcement_learning.td_control.tasks import ControlTask
 from labs.tasks.grid_world.cells import CellWorld
 from labs.tasks.grid_world.walk import GridWalk, advance_walk, choose_steps, start_walk
 from labs.tasks.pendulum_table.swing import Swing, advance_swing, look_up_torques, start_swing
@@ -19,7 +19,7 @@ REST = 5
 """Decisions that walkers rest at the goal."""
 
 
-def start_greedy_walk(task: LearningTask, many: int) -> GridWalk | Swing:
+def start_greedy_walk(task: ControlTask, many: int) -> GridWalk | Swing:
     """All at the start, before the first decision."""
     if isinstance(task.place, CellWorld):
         return start_walk(task.place, MOVE, many)
@@ -27,7 +27,7 @@ def start_greedy_walk(task: LearningTask, many: int) -> GridWalk | Swing:
 
 
 def follow_greedy_policies(
-    task: LearningTask, policies: np.ndarray, walk: GridWalk | Swing, random: np.ndarray
+    task: ControlTask, policies: np.ndarray, walk: GridWalk | Swing, random: np.ndarray
 ) -> GridWalk | Swing:
     """One PERIOD later. `policies` (M, X) holds each one's controls; `random` (4,) uint64, of the
     steps' outcomes, changes in place."""

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from labs.arrays import Training
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.number_texts import counted
 from labs.params import Value
@@ -17,9 +18,8 @@ from labs.reinforcement_learning.td_control.greedy_walk import (
 )
 from labs.reinforcement_learning.td_control.params import BATCHES, LEARNING_METHODS, TdParams
 from labs.reinforcement_learning.td_control.plots import ORDER, PLOTS, learner_maps, learning_curves
-from labs.reinforcement_learning.td_control.tasks import LearningTask
+from labs.reinforcement_learning.td_control.tasks import ControlTask
 from labs.reinforcement_learning.td_control.training import (
-    Training,
     batch_size,
     episodes_done,
     fits_task,
@@ -251,7 +251,7 @@ def _current(params: TdParams, state: TdState) -> Training:
     return training if fits_task(training, task) else transfer(training, task, params.q0)
 
 
-def _span(task: LearningTask, V: np.ndarray) -> tuple[float, float]:
+def _span(task: ControlTask, V: np.ndarray) -> tuple[float, float]:
     """The ends of the scale of colours: the values to be learned, and above them the largest
     estimate, within reason."""
     low, high = value_span(task.q_star[task.compared].min(axis=1))

@@ -8,7 +8,7 @@ from labs.params import Group, Params, When
 from labs.problems.episodes import UpdateRule
 from labs.reinforcement_learning.td_control.tasks import (
     LARGEST_GAMMA,
-    LearningTask,
+    ControlTask,
     grid_task,
     pendulum_task,
     table_task,
@@ -212,7 +212,7 @@ class TdParams(Params):
     """The map of Q shows this control; 0: the best in each state."""
 
     @property
-    def task(self) -> LearningTask:
+    def task(self) -> ControlTask:
         """What is to be learned."""
         if self.system == "pendulum":
             gamma = min(self.gamma, LARGEST_GAMMA)

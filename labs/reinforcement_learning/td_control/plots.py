@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from labs.arrays import Training
 from labs.plots import Bars, Curves, HeatMap, Line, Note, Plot, Readout, TimeSeries, Trace
 from labs.reinforcement_learning.td_control.params import LEARNING_METHODS
-from labs.reinforcement_learning.td_control.tasks import LearningTask
-from labs.reinforcement_learning.td_control.training import CURVES, Training
+from labs.reinforcement_learning.td_control.tasks import ControlTask
+from labs.reinforcement_learning.td_control.training import CURVES
 from labs.tasks.grid_world.cells import CellWorld
 from labs.tasks.grid_world.map import GridWorld
 from labs.tasks.grid_world.policy_arrows import policy_arrows
@@ -65,7 +66,7 @@ PLOTS: tuple[Plot, ...] = (
 
 
 def learner_maps(
-    task: LearningTask, q: np.ndarray, visits: np.ndarray, control: int
+    task: ControlTask, q: np.ndarray, visits: np.ndarray, control: int
 ) -> dict[str, np.ndarray]:
     """Of one learner's Q and visits, both (X, U), seen from above, row 0 on top: NaN where there is
     nothing to show; the greedy policy as arrows, where it has been. `control` counts from 1; 0: the
@@ -91,7 +92,7 @@ def learner_maps(
     return axes | {name: task.on_map(of, np.nan)[::upwards] for name, of in values.items()}
 
 
-def learning_curves(task: LearningTask, training: Training) -> dict[str, np.ndarray]:
+def learning_curves(task: ControlTask, training: Training) -> dict[str, np.ndarray]:
     """The curves over episodes: the mean (of greedy costs the median) of all learners, the least
     and the largest."""
     episodes, none = training["episodes"], np.zeros(0)

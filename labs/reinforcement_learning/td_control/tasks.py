@@ -27,7 +27,7 @@ KP, KD = 10.0, 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class LearningTask:
+class ControlTask:
     """What is to be learned."""
 
     mdp: FiniteMDP
@@ -82,7 +82,7 @@ def grid_task(
     living: float,
     gamma: float,
     anywhere: bool,
-) -> LearningTask:
+) -> ControlTask:
     """A walk to the goal."""
     world = grid_world(text, kings)
     mdp = world.mdp(gamma, slip, sideways, living)
@@ -91,7 +91,7 @@ def grid_task(
 
 
 @lru_cache(maxsize=16)
-def table_task(text: str, gamma: float, anywhere: bool) -> LearningTask:
+def table_task(text: str, gamma: float, anywhere: bool) -> ControlTask:
     """What a table says, from its first state on."""
     world = table_world(text)
     mdp = world.mdp(gamma)
@@ -100,7 +100,7 @@ def table_task(text: str, gamma: float, anywhere: bool) -> LearningTask:
 
 
 @lru_cache(maxsize=8)
-def pendulum_task(gamma: float, effort: float, anywhere: bool) -> LearningTask:
+def pendulum_task(gamma: float, effort: float, anywhere: bool) -> ControlTask:
     """To swing up from hanging at rest and stay there."""
     mdp = PENDULUM.mdp(gamma, w_u=effort)
     start = int(PENDULUM.state(np.zeros(1), np.zeros(1)))
@@ -140,12 +140,12 @@ def _task(
     teacher: np.ndarray,
     shape: tuple[int, int],
     cells: np.ndarray,
-) -> LearningTask:
+) -> ControlTask:
     first = np.zeros(mdp.X, np.int64) if mdp.deterministic else random_policy(mdp)
     value, _, _ = policy_iteration.optimum(mdp, first)
     starts = [int(x) for x in np.flatnonzero(~mdp.terminal)] if anywhere else [start]
     q_star = q_values(mdp, value)
-    return LearningTask(
+    return ControlTask(
         mdp=mdp,
         place=place,
         learning=episodic_task(mdp, starts, horizon),

@@ -14,7 +14,7 @@ is a mapping of arrays, M methods with S learners each, after k batches of episo
     off, most (M, S, k)        root mean square and largest of |Q - Q*|
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -22,10 +22,10 @@ from labs.algorithms.exploration import BehaviourPolicy
 from labs.algorithms.policy_evaluation import exact
 from labs.algorithms.td_control import SARSA_LAMBDA, Learners, greedy_costs, init, step
 from labs.algorithms.td_lambda import NEGLIGIBLE_TRACE
+from labs.arrays import Training
 from labs.problems.episodes import UpdateRule
-from labs.reinforcement_learning.td_control.tasks import LearningTask
+from labs.reinforcement_learning.td_control.tasks import ControlTask
 
-Training = Mapping[str, np.ndarray]
 CURVES = ("online", "offline", "off", "most")
 STEP_TIME, TRACE_TIME, BUDGET = 40.0, 2.5, 4e6
 """[ns] About what a transition takes, a trace at each transition, and what a batch may take for
@@ -37,7 +37,7 @@ KEPT = 1000
 
 
 def initial_training(
-    task: LearningTask, methods: int, seeds: int, rng: np.random.Generator, q0: float
+    task: ControlTask, methods: int, seeds: int, rng: np.random.Generator, q0: float
 ) -> Training:
     """Nothing learned yet: Q = q0 everywhere."""
     learners = init((task.mdp.X, task.mdp.U), seeds, rng, q0)
@@ -60,7 +60,7 @@ def _learners(training: Training, method: int) -> Learners:
 
 
 def train(
-    task: LearningTask,
+    task: ControlTask,
     behaviour: BehaviourPolicy,
     rule: UpdateRule,
     methods: Sequence[int],
@@ -95,7 +95,7 @@ def train(
     }
 
 
-def _offline(task: LearningTask, learners: Learners, trials: int) -> np.ndarray:
+def _offline(task: ControlTask, learners: Learners, trials: int) -> np.ndarray:
     """(S,) from the start. An episode that is cut costs less than the policy does, and may cost
     less than the best."""
     if task.mdp.deterministic and task.mdp.gamma < 1.0:
@@ -105,7 +105,7 @@ def _offline(task: LearningTask, learners: Learners, trials: int) -> np.ndarray:
 
 
 def batch_size(
-    task: LearningTask, rule: UpdateRule, methods: Sequence[int], training: Training, most: int
+    task: ControlTask, rule: UpdateRule, methods: Sequence[int], training: Training, most: int
 ) -> int:
     """Episodes of the next batch: `most`, or fewer while they are so long that it would take more
     than the budget. Transitions are counted, not seconds: all machines do the same."""
@@ -127,13 +127,13 @@ def episodes_done(training: Training) -> int:
     return int(training["episodes"][-1]) if len(training["episodes"]) else 0
 
 
-def fits_task(training: Training, task: LearningTask) -> bool:
+def fits_task(training: Training, task: ControlTask) -> bool:
     """Whether its tables are those of this task's states and controls."""
     same = training["q"].shape[2:] == task.q_star.shape
     return same and np.array_equal(training["cells"], task.cells)
 
 
-def transfer(training: Training, task: LearningTask, q0: float) -> Training:
+def transfer(training: Training, task: ControlTask, q0: float) -> Training:
     """The training on a map that was changed: what was learned of a cell stays with the cell."""
     places = {tuple(cell): x for x, cell in enumerate(training["cells"].tolist())}
     shared = [(x, places[c]) for x, c in enumerate(map(tuple, task.cells.tolist())) if c in places]

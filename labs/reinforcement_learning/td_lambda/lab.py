@@ -11,7 +11,7 @@ from labs.params import Value
 from labs.problems.prediction import root_mean_square_error
 from labs.random_numbers import seeded
 from labs.reinforcement_learning.td_lambda.live import (
-    Steps,
+    PartialEpisode,
     credit,
     draw_episode,
     learned,
@@ -28,7 +28,7 @@ from labs.reinforcement_learning.td_lambda.plots import (
     sweep_curves,
     sweep_numbers,
 )
-from labs.reinforcement_learning.td_lambda.sweep import NOTHING, Sweep, family_names, run
+from labs.reinforcement_learning.td_lambda.sweep import NOTHING, SweepErrors, family_names, run
 from labs.scene import Scene
 from labs.tasks.grid_world.map import MAPS, grid_world
 from labs.tasks.grid_world.params import edit_map
@@ -50,7 +50,7 @@ class TdLambdaState(State):
     """(4,) uint64: of the learners that are measured."""
     random: np.ndarray
     """(4,) uint64: of the walk's episodes."""
-    steps: Steps
+    steps: PartialEpisode
     before: np.ndarray
     """(M, X) the values before this episode."""
     values: np.ndarray
@@ -62,7 +62,7 @@ class TdLambdaState(State):
     """(M,) how many values the last episode changed; none before the first."""
     gaps: np.ndarray
     """(k,) largest difference of both methods' values after each episode."""
-    sweep: Sweep
+    sweep: SweepErrors
 
 
 class TdLambda(Lab[TdLambdaParams, TdLambdaState]):

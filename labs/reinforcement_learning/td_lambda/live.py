@@ -20,7 +20,7 @@ WAIT_FOR_THE_END = ("forward", "monte-carlo")
 """Methods that learn nothing before an episode is over."""
 
 
-class Steps(NamedTuple):
+class PartialEpisode(NamedTuple):
     """An episode of T steps, and how many of them were walked."""
 
     states: np.ndarray
@@ -34,14 +34,16 @@ class Steps(NamedTuple):
         return self.done == len(self.costs)
 
 
-def draw_episode(place: Place, random: np.ndarray) -> Steps:
+def draw_episode(place: Place, random: np.ndarray) -> PartialEpisode:
     """An episode before its first step. `random` (4,) changes in place."""
     room = empty_episode(place.task.task.horizon)
     T = int(sample_episode(place.task, random, room))
-    return Steps(room.states[: T + 1].copy(), room.costs[:T].copy())
+    return PartialEpisode(room.states[: T + 1].copy(), room.costs[:T].copy())
 
 
-def learned(place: Place, method: str, rule: UpdateRule, V: np.ndarray, steps: Steps) -> np.ndarray:
+def learned(
+    place: Place, method: str, rule: UpdateRule, V: np.ndarray, steps: PartialEpisode
+) -> np.ndarray:
     """(X,) the values after the steps done, from V (X,), those before the episode."""
     V, N, t = V.copy(), np.zeros(len(V), np.int32), steps.done
     gamma, over = place.task.task.gamma, steps.over
@@ -67,7 +69,9 @@ def learned(place: Place, method: str, rule: UpdateRule, V: np.ndarray, steps: S
     return V
 
 
-def credit(gamma: float, method: str, rule: UpdateRule, steps: Steps, states: int) -> np.ndarray:
+def credit(
+    gamma: float, method: str, rule: UpdateRule, steps: PartialEpisode, states: int
+) -> np.ndarray:
     """(X,) e: how much the surprise of the last step done counts in the update of each of so many
     states. Of TD(lambda) it is the eligibility trace. A method that waits has one, too: while the
     values stand still, the n-step return less V(x_t) is the sum of gamma^k delta_(t+k) over the
@@ -101,7 +105,7 @@ def return_weights(method: str, rule: UpdateRule, ahead: int) -> np.ndarray:
     return np.asarray(np.where(n < ahead, 1.0 - lam, 1.0) * lam ** (n - 1.0))
 
 
-def n_step_returns(gamma: float, V: np.ndarray, steps: Steps) -> np.ndarray:
+def n_step_returns(gamma: float, V: np.ndarray, steps: PartialEpisode) -> np.ndarray:
     """(t,) J^(n) of the first state of the episode, n = 1 to the steps done, with the values V
     (X,) from before it."""
     t = steps.done

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from labs.colors import sequential
-from labs.reinforcement_learning.td_lambda.live import Steps
+from labs.reinforcement_learning.td_lambda.live import PartialEpisode
 from labs.reinforcement_learning.td_lambda.tasks import Place
 from labs.scene import Scene
 from labs.tasks.grid_world.picture import board, draw_board, draw_way
@@ -19,7 +19,7 @@ WAY = 150
 def draw_place(
     scene: Scene,
     place: Place,
-    steps: Steps,
+    steps: PartialEpisode,
     part: float,
     trace: np.ndarray,
     values: Sequence[np.ndarray],

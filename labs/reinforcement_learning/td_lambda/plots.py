@@ -8,7 +8,7 @@ from labs.plots import Bars, Curves, HeatMap, Line, Note, Plot, Readout, TimeSer
 from labs.reinforcement_learning.td_lambda.params import TD_METHODS, TdLambdaParams
 from labs.reinforcement_learning.td_lambda.sweep import (
     ALPHAS,
-    Sweep,
+    SweepErrors,
     family_values,
     measured,
     plan,
@@ -86,7 +86,7 @@ PLOTS: tuple[Plot, ...] = (
 )  # fmt: skip
 
 
-def sweep_curves(params: TdLambdaParams, sweep: Sweep) -> dict[str, np.ndarray]:
+def sweep_curves(params: TdLambdaParams, sweep: SweepErrors) -> dict[str, np.ndarray]:
     """Errors over step sizes, NaN where not measured yet or larger than shown."""
     parts, untrained = plan(params), params.place.untrained
     here = measured(sweep, "here", parts["here"])
@@ -105,7 +105,7 @@ def sweep_curves(params: TdLambdaParams, sweep: Sweep) -> dict[str, np.ndarray]:
     }
 
 
-def sweep_numbers(params: TdLambdaParams, sweep: Sweep) -> dict[str, float]:
+def sweep_numbers(params: TdLambdaParams, sweep: SweepErrors) -> dict[str, float]:
     """The errors as set, and the least of the family once it is complete."""
     parts = plan(params)
     here, family = (measured(sweep, part, parts[part]) for part in ("here", "family"))

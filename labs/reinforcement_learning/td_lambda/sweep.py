@@ -30,12 +30,14 @@ WORST = 10.0
 """Times the error of having learned nothing: larger errors, of learners that diverge, are given as
 that."""
 
-Sweep = Mapping[str, Mapping[str, str | np.ndarray]]
+SweepErrors = Mapping[str, Mapping[str, str | np.ndarray]]
 """By the part: "key", which says of what, and "errors" (k,), those measured so far, in order."""
-NOTHING: Sweep = {part: {"key": "", "errors": np.zeros(0)} for part in ("here", "own", "family")}
+NOTHING: SweepErrors = {
+    part: {"key": "", "errors": np.zeros(0)} for part in ("here", "own", "family")
+}
 
 
-class Part(NamedTuple):
+class SweepPart(NamedTuple):
     """What is to be measured."""
 
     key: str
@@ -58,7 +60,7 @@ def family_names(method: str) -> tuple[str, ...]:
 
 
 @lru_cache(maxsize=4)
-def plan(params: TdLambdaParams) -> Mapping[str, Part]:
+def plan(params: TdLambdaParams) -> Mapping[str, SweepPart]:
     """The parts of the sweep under these parameters, in order."""
     general = (*params.place_key, params.episodes, params.offline)
     own = (*general, *params.methods, round(params.n), params.lam)
@@ -70,11 +72,11 @@ def plan(params: TdLambdaParams) -> Mapping[str, Part]:
         for value in family_values(params.method)
     ]  # fmt: skip
     return {
-        "here": Part(repr((*own, params.alpha)), list(rules.items())),
-        "own": Part(
+        "here": SweepPart(repr((*own, params.alpha)), list(rules.items())),
+        "own": SweepPart(
             repr(own), [(m, r) for name in rules for m, r in _over_alpha(name, rules[name])]
         ),
-        "family": Part(
+        "family": SweepPart(
             repr((*general, params.method)),
             [point for rule in members for point in _over_alpha(params.method, rule)],
         ),
@@ -85,7 +87,7 @@ def _over_alpha(method: str, rule: UpdateRule) -> list[tuple[str, UpdateRule]]:
     return [(method, rule._replace(alpha=float(alpha))) for alpha in ALPHAS]
 
 
-def measured(sweep: Sweep, part: str, wanted: Part) -> np.ndarray:
+def measured(sweep: SweepErrors, part: str, wanted: SweepPart) -> np.ndarray:
     """(k,) the errors of a part known so far; none if they are about something else."""
     there = sweep[part]
     errors = there["errors"] if there["key"] == wanted.key else np.zeros(0)
@@ -93,7 +95,7 @@ def measured(sweep: Sweep, part: str, wanted: Part) -> np.ndarray:
     return errors
 
 
-def run(params: TdLambdaParams, seed: np.ndarray, sweep: Sweep) -> Iterator[Snapshot | None]:
+def run(params: TdLambdaParams, seed: np.ndarray, sweep: SweepErrors) -> Iterator[Snapshot | None]:
     """Measures what is not known yet, a point an iteration."""
     parts = plan(params)
     known = {name: measured(sweep, name, part) for name, part in parts.items()}

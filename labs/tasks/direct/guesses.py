@@ -9,7 +9,7 @@ from labs.models.discrete import Discrete
 from labs.problems.optimal_control import LARGEST_STATE
 from labs.tasks.direct.params import DirectParams
 from labs.tasks.direct.plan_params import PlanParams
-from labs.tasks.direct.trajectory import Trajectory
+from labs.tasks.direct.trajectory import PiecewiseTrajectory
 
 STEP = 0.01
 """[s] The most a step of integration takes."""
@@ -56,14 +56,14 @@ def warm(params: PlanParams, reusable: bool) -> bool:
     return params.start == "warm" and reusable
 
 
-def start_guess(params: DirectParams, motion: Trajectory, reusable: bool, N: int) -> Guess:
+def start_guess(params: DirectParams, motion: PiecewiseTrajectory, reusable: bool, N: int) -> Guess:
     """What a change of the problem is solved from: the present motion, or the first guess."""
     if warm(params, reusable):
         return resampled(params, motion, N)
     return first_guess(params, N)
 
 
-def resampled(params: DirectParams, motion: Trajectory, N: int) -> Guess:
+def resampled(params: DirectParams, motion: PiecewiseTrajectory, N: int) -> Guess:
     """The present motion on a grid of N steps, in the horizon's time if that is fixed."""
     T = motion.T if params.objective == "least-time" else params.horizon
     times = np.linspace(0.0, motion.T, N + 1)

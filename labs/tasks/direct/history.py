@@ -6,10 +6,10 @@ from typing import Self
 
 import numpy as np
 
-from labs.algorithms.sqp import Iterate
+from labs.algorithms.sqp import SqpIterate
 from labs.tasks.direct.params import DirectParams
-from labs.tasks.direct.systems import System
-from labs.tasks.direct.trajectory import Trajectory
+from labs.tasks.direct.systems import RestToRestTask
+from labs.tasks.direct.trajectory import PiecewiseTrajectory
 
 KEPT = 6
 """Iterations whose paths are drawn."""
@@ -21,7 +21,7 @@ motions along one circle part."""
 
 
 @dataclass(frozen=True, eq=False)
-class History:
+class IterationHistory:
     """Numbers of all iterations and the last paths. Arrays are never written into again."""
 
     cost: np.ndarray
@@ -40,7 +40,7 @@ class History:
     """(KEPT, pieces, ARC_POINTS, 2): position and velocity of the joint that tells most."""
 
     @classmethod
-    def start(cls, params: DirectParams, at: Iterate, motion: Trajectory) -> Self:
+    def start(cls, params: DirectParams, at: SqpIterate, motion: PiecewiseTrajectory) -> Self:
         """Of a first guess."""
         none, gaps = np.zeros(0), np.linalg.norm(motion.gaps, axis=1)
         tips, phases = _arcs(params, motion)
@@ -54,7 +54,7 @@ class History:
             np.tile(phases, (KEPT, 1, 1, 1)),
         )
 
-    def append(self, params: DirectParams, at: Iterate, motion: Trajectory) -> Self:
+    def append(self, params: DirectParams, at: SqpIterate, motion: PiecewiseTrajectory) -> Self:
         """One iteration later."""
         tips, phases = _arcs(params, motion)
         return type(self)(
@@ -72,13 +72,13 @@ class History:
         return len(self.alpha)
 
 
-def drawn(at: System, places: np.ndarray, times: np.ndarray) -> np.ndarray:
+def drawn(at: RestToRestTask, places: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Places (..., 3) [m] at `times` (...) [s], moved back as time goes where motions are plane."""
     shift = SPEED * times[..., None] * np.array([1.0, 0.0, 0.0])
     return np.asarray(places - shift if at.planar else places)
 
 
-def _arcs(params: DirectParams, motion: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+def _arcs(params: DirectParams, motion: PiecewiseTrajectory) -> tuple[np.ndarray, np.ndarray]:
     """Of the tip (pieces, ARC_POINTS, 3) as drawn, and in the phase plane (..., 2)."""
     body, joint = params.task.mechanism, params.task.shown
     X = motion.arcs(ARC_POINTS)

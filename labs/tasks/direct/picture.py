@@ -4,7 +4,7 @@ direct methods: the pieces of the path, parted where they do not join."""
 import numpy as np
 
 from labs.scene import Color, Scene
-from labs.tasks.direct.history import KEPT, History, drawn
+from labs.tasks.direct.history import KEPT, IterationHistory, drawn
 from labs.tasks.direct.params import DirectParams
 from labs.tasks.direct.plan_params import PlanParams
 from labs.tasks.direct.player import DirectState
@@ -101,7 +101,7 @@ def joined(arcs: np.ndarray) -> list[np.ndarray]:
     return [np.concatenate(list(run)) for run in np.split(arcs, cuts)]
 
 
-def phase_fields(history: History) -> dict[str, np.ndarray]:
+def phase_fields(history: IterationHistory) -> dict[str, np.ndarray]:
     """The newest motion in the phase plane, one curve a piece, and the one before it."""
     now, before = history.phases[-1], history.phases[-2]
     return {

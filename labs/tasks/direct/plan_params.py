@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from labs.algorithms.sqp_iterate import HESSIANS, Options
+from labs.algorithms.sqp_iterate import HESSIANS, SqpOptions
 from labs.lab import ChoiceSettings
 from labs.params import Group, Params
 from labs.problems.continuous_control import ContinuousProblem
-from labs.tasks.direct.systems import TITLES, System, reaching_posture, system
+from labs.tasks.direct.systems import TITLES, RestToRestTask, reaching_posture, system
 from labs.tasks.motion.continuous import OBJECTIVES, MotionLimits, continuous_motion
 from labs.tasks.motion.motions import MotionWeights
 from labs.tasks.motion.tip_constraints import Ball
@@ -123,7 +123,7 @@ class PlanParams(Params):
     """Before the solver stops short."""
 
     @property
-    def task(self) -> System:
+    def task(self) -> RestToRestTask:
         return system(self.system)
 
     @property
@@ -187,5 +187,5 @@ class PlanParams(Params):
         return replace(motion, x0=self.task.x0)
 
     @property
-    def options(self) -> Options:
-        return Options(hessian=self.hessian, iterations=round(self.iterations))
+    def options(self) -> SqpOptions:
+        return SqpOptions(hessian=self.hessian, iterations=round(self.iterations))

@@ -9,11 +9,11 @@ import numpy as np
 from labs.models.coordinates import coordinate_labels
 from labs.models.mechanisms import Mechanism, mechanism
 from labs.params import Value
-from labs.tasks.direct.history import History
+from labs.tasks.direct.history import IterationHistory
 from labs.tasks.direct.params import DirectParams
 from labs.tasks.direct.plan_params import PlanParams
-from labs.tasks.direct.trajectory import Trajectory
-from labs.tasks.motion.playback import SUBSTEP, Plan, advance_playback
+from labs.tasks.direct.trajectory import PiecewiseTrajectory
+from labs.tasks.motion.playback import SUBSTEP, NominalTrajectory, advance_playback
 from labs.tasks.motion.player import (
     PERIOD,
     PlayerState,
@@ -27,8 +27,8 @@ from labs.tasks.motion.player import (
 class DirectState(PlayerState):
     """The motion, how it was found, and how it is being played."""
 
-    motion: Trajectory
-    history: History
+    motion: PiecewiseTrajectory
+    history: IterationHistory
     reusable: bool = False
     """Whether a change may be solved from the motion: it is of a solve that did not fail."""
 
@@ -36,7 +36,13 @@ class DirectState(PlayerState):
 S = TypeVar("S", bound=DirectState)
 
 
-def replayed(state: S, motion: Trajectory, plan: Plan, history: History, failed: bool) -> S:
+def replayed(
+    state: S,
+    motion: PiecewiseTrajectory,
+    plan: NominalTrajectory,
+    history: IterationHistory,
+    failed: bool,
+) -> S:
     """With another motion, and its plan at ticks with a regulator, to be played from its start."""
     return replace(play_from_start(state, plan, failed), motion=motion, history=history)
 

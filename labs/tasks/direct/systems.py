@@ -34,7 +34,7 @@ CAMERAS: Mapping[str, tuple[Vector3, Vector3]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class System:
+class RestToRestTask:
     """A mechanism with its task: to come from rest to rest at a goal."""
 
     motion: str
@@ -78,13 +78,13 @@ class System:
 
 
 @cache
-def system(name: str) -> System:
+def system(name: str) -> RestToRestTask:
     """The one of this name, a key of TITLES."""
     motion_name = "pendulum" if name == "upright" else name
     motion, body = CONTINUOUS_MOTIONS[motion_name], mechanism(motion_name)
     goal, home = np.array(motion.goal), body.arm.home
     q0 = goal - LEAN if name == "upright" else home
-    return System(
+    return RestToRestTask(
         motion_name,
         body,
         np.concatenate([q0, np.zeros(body.nq)]),

@@ -13,8 +13,8 @@ from labs.errors import LabError
 from labs.models.discrete import Discrete
 from labs.problems.linear_quadratic import LqrProblem
 from labs.tasks.direct.params import DirectParams
-from labs.tasks.direct.trajectory import Trajectory
-from labs.tasks.motion.playback import Plan
+from labs.tasks.direct.trajectory import PiecewiseTrajectory
+from labs.tasks.motion.playback import NominalTrajectory
 
 TICK = 0.01
 """[s] The control is held for it."""
@@ -22,13 +22,13 @@ VELOCITY_WEIGHT = 0.01
 """w_v, in parts of w."""
 
 
-def playable(params: DirectParams, motion: Trajectory) -> Plan:
+def playable(params: DirectParams, motion: PiecewiseTrajectory) -> NominalTrajectory:
     """The motion at ticks, with the regulator's gains; with none where there is no regulator."""
     at = params.task
     N = max(1, round(motion.T / TICK))
     ticks = TICK * np.arange(N + 1)
     X, U = motion.states(at.mechanism, ticks), motion.mean_controls(ticks)
-    return Plan(X, U, _gains(params, X, U), TICK)
+    return NominalTrajectory(X, U, _gains(params, X, U), TICK)
 
 
 def _gains(params: DirectParams, X: np.ndarray, U: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from labs.models.mechanisms import Mechanism
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory:
+class PiecewiseTrajectory:
     """k pieces of the same duration. Piece i starts at state i and ends where the dynamics lead
     it; what is missing to state i + 1 is its gap. Arrays are never written into again."""
 

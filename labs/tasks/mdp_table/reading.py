@@ -60,7 +60,7 @@ TRUE, FALSE = ("1", "1.0", "true", "yes", "x"), ("", "0", "0.0", "false", "no")
 
 
 @dataclass(frozen=True)
-class Entry:
+class TableRow:
     """A row."""
 
     number: int
@@ -79,7 +79,7 @@ class Entry:
         return _name(self.number, self.state, self.control)
 
 
-def read_entries(text: str) -> tuple[list[Entry], tuple[str, ...]]:
+def read_entries(text: str) -> tuple[list[TableRow], tuple[str, ...]]:
     """The rows, and what was understood otherwise than written. Raises LabError."""
     text = text.replace("\ufeff", "")
     reader = _read_json if text.lstrip()[:1] in ("[", "{") else _read_csv
@@ -89,7 +89,7 @@ def read_entries(text: str) -> tuple[list[Entry], tuple[str, ...]]:
     return entries, notes
 
 
-def _read_csv(text: str, rewarded: list[str]) -> Iterator[Entry]:
+def _read_csv(text: str, rewarded: list[str]) -> Iterator[TableRow]:
     lines = [line for line in text.splitlines() if line.strip()]
     mark = ""
     if lines and lines[0].strip().strip('"').lower().startswith("sep="):
@@ -164,7 +164,7 @@ def _without_trailing(cells: Sequence[str]) -> list[str]:
     return kept
 
 
-def _read_json(text: str, rewarded: list[str]) -> Iterator[Entry]:
+def _read_json(text: str, rewarded: list[str]) -> Iterator[TableRow]:
     try:
         rows = json.loads(_json_of_python(text), parse_int=float)
     except (ValueError, RecursionError) as error:
@@ -224,7 +224,7 @@ def _gymnasium_rows(P: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
         ) from None
 
 
-def _entry(number: int, row: Mapping[str, Any], rewarded: list[str], long: str) -> Entry:
+def _entry(number: int, row: Mapping[str, Any], rewarded: list[str], long: str) -> TableRow:
     state, control = (_word(row.get(key, "")) for key in ("state", "control"))
     name = _name(number, state, control)
     if not state:
@@ -236,7 +236,7 @@ def _entry(number: int, row: Mapping[str, Any], rewarded: list[str], long: str) 
         raise LabError(f"{name}: the cost {cost:g} is beyond {MAX_COST:g}")
     if not long:
         to = {str(y).strip(): _probability(p, name, str(y)) for y, p in row["to"].items()}
-        return Entry(number, state, control, cost + 0.0, to, False)
+        return TableRow(number, state, control, cost + 0.0, to, False)
     ahead = _word(row["to"])
     if not ahead:
         raise LabError(f"{name}: it does not say where it leads to")
@@ -245,7 +245,7 @@ def _entry(number: int, row: Mapping[str, Any], rewarded: list[str], long: str) 
     end = str(row.get("end", "")).strip().lower()
     if end not in TRUE + FALSE:
         raise LabError(f"{name}: {shorten(end)!r} for terminal is neither true nor false")
-    return Entry(number, state, control, cost + 0.0, {ahead: p}, True, (ahead,) * (end in TRUE))
+    return TableRow(number, state, control, cost + 0.0, {ahead: p}, True, (ahead,) * (end in TRUE))
 
 
 def _word(value: object) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 
 from labs.errors import LabError
 from labs.problems.finite_mdp import FiniteMDP
-from labs.tasks.mdp_table.reading import Entry, read_entries
+from labs.tasks.mdp_table.reading import TableRow, read_entries
 
 SUM_TOLERANCE = 1e-6
 """How far a row may be from summing to 1: somebody wrote 0.333333."""
@@ -21,7 +21,7 @@ NAMED = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class MdpTable:
     """A Markov decision process with names; with a single control, a Markov reward process."""
 
     states: tuple[str, ...]
@@ -59,7 +59,7 @@ class Table:
 
 
 @lru_cache(maxsize=16)
-def parse_table(text: str, most: int = MAX_STATES) -> Table:
+def parse_table(text: str, most: int = MAX_STATES) -> MdpTable:
     """The table of at most `most` states a text holds, CSV or JSON. Raises LabError with the row
     that is wrong, what it says and what is allowed."""
     entries, notes = read_entries(text)
@@ -79,16 +79,16 @@ def parse_table(text: str, most: int = MAX_STATES) -> Table:
     over = {y for entry in entries for y in entry.ends}
     x = [k for k, name in enumerate(states) if name in ends or name in over]
     P[:, x], C[x], known[x] = np.eye(len(states))[x], 0.0, True
-    return Table(states, controls, *_completed(P, C, known), notes)
+    return MdpTable(states, controls, *_completed(P, C, known), notes)
 
 
 def _filled(
-    entries: Iterable[Entry], states: Sequence[str], controls: Sequence[str]
+    entries: Iterable[TableRow], states: Sequence[str], controls: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """P, C, and which (X, U) there are rows for."""
     X, U = len(states), len(controls)
     P, C, known = np.zeros((U, X, X)), np.zeros((X, U)), np.zeros((X, U), bool)
-    long: dict[tuple[int, int], Entry] = {}
+    long: dict[tuple[int, int], TableRow] = {}
     place = {name: k for k, name in enumerate(states)}
     for entry in entries:
         x = place[entry.state]

@@ -9,7 +9,7 @@ import numpy as np
 
 from labs.problems.finite_mdp import FiniteMDP
 from labs.tasks.grid_world.cells import CellWorld
-from labs.tasks.mdp_table.table import Table, parse_table
+from labs.tasks.mdp_table.table import MdpTable, parse_table
 
 UNNAMED = "Here states have no names."
 """In place of words about each state of a table."""
@@ -21,7 +21,7 @@ class TableWorld(CellWorld):
 
     largest_cell: ClassVar[float] = 0.5
 
-    table: Table
+    table: MdpTable
 
     @property
     def shape(self) -> tuple[int, int]:

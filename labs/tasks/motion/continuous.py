@@ -24,11 +24,11 @@ from labs.models.mechanisms import mechanism
 from labs.problems.continuous_control import ContinuousProblem
 from labs.tasks.motion.continuous_cost import ContinuousMotionCost, SoftLimits
 from labs.tasks.motion.cost import TipCost
-from labs.tasks.motion.motions import MOTIONS, RAIL_VIEW, Motion, MotionWeights
+from labs.tasks.motion.motions import MOTIONS, RAIL_VIEW, MotionTask, MotionWeights
 from labs.tasks.motion.tip_constraints import AtTarget, Ball, OutsideBalls
 
-CONTINUOUS_MOTIONS: Mapping[str, Motion] = {
-    "mass": Motion("Mass on a line", (1.0,), (1.0,), RAIL_VIEW),
+CONTINUOUS_MOTIONS: Mapping[str, MotionTask] = {
+    "mass": MotionTask("Mass on a line", (1.0,), (1.0,), RAIL_VIEW),
     **MOTIONS,
 }
 OBJECTIVES: Mapping[str, str] = {

@@ -25,7 +25,7 @@ from labs.tasks.motion.cost import MotionCost, TipCost
 
 
 @dataclass(frozen=True)
-class Motion:
+class MotionTask:
     """What one mechanism is to do."""
 
     title: str
@@ -43,13 +43,13 @@ NEAR_VIEW = ((1.5, 0.6, 0.95), (0.0, 0.0, 0.72))
 FAR_VIEW = ((2.6, 1.0, 1.5), (0.0, 0.0, 1.2))
 RAIL_VIEW = ((2.3, 0.6, 1.1), (0.0, 0.0, 0.75))
 ROBOT_VIEW = ((1.15, -0.85, 0.8), (0.22, -0.02, 0.33))
-MOTIONS: Mapping[str, Motion] = {
-    "pendulum": Motion("Pendulum", (np.pi,), (4.905,), NEAR_VIEW),
-    "double-pendulum": Motion("Double pendulum", (np.pi, 0.0), (19.62, 4.905), FAR_VIEW),
-    "acrobot": Motion("Acrobot: elbow driven alone", (np.pi, 0.0), (4.905,), FAR_VIEW),
-    "pendubot": Motion("Pendubot: shoulder driven alone", (np.pi, 0.0), (19.62,), FAR_VIEW),
-    "cart-pole": Motion("Cart-pole", (0.0, np.pi), (20.0,), RAIL_VIEW, shown_joint=1),
-    "ur5": Motion(
+MOTIONS: Mapping[str, MotionTask] = {
+    "pendulum": MotionTask("Pendulum", (np.pi,), (4.905,), NEAR_VIEW),
+    "double-pendulum": MotionTask("Double pendulum", (np.pi, 0.0), (19.62, 4.905), FAR_VIEW),
+    "acrobot": MotionTask("Acrobot: elbow driven alone", (np.pi, 0.0), (4.905,), FAR_VIEW),
+    "pendubot": MotionTask("Pendubot: shoulder driven alone", (np.pi, 0.0), (19.62,), FAR_VIEW),
+    "cart-pole": MotionTask("Cart-pole", (0.0, np.pi), (20.0,), RAIL_VIEW, shown_joint=1),
+    "ur5": MotionTask(
         "UR5, reaching", (), (150.0, 150.0, 150.0, 28.0, 28.0, 28.0), ROBOT_VIEW, shown_joint=1
     ),
 }

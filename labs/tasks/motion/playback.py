@@ -25,7 +25,7 @@ FEEDBACK, OPEN_LOOP = 0, 1
 
 
 @dataclass(frozen=True)
-class Plan:
+class NominalTrajectory:
     """What a solver found: x_bar (N + 1, nx), u_bar (N, nu), gains K (N, nu, nx) and h [s]."""
 
     X: np.ndarray
@@ -60,18 +60,18 @@ class Playback:
     diverged: np.ndarray
     """(2,) whether a run has diverged; it stays where it was."""
 
-    def finished(self, plan: Plan) -> bool:
+    def finished(self, plan: NominalTrajectory) -> bool:
         return self.clock >= plan.N * plan.substeps
 
 
-def start_playback(plan: Plan) -> Playback:
+def start_playback(plan: NominalTrajectory) -> Playback:
     """Both at the plan's start."""
     x, u, X, U = (np.stack([a, a]) for a in (plan.X[0], plan.U[0], plan.X, plan.U))
     return Playback(x, u, X, U, clock=0, diverged=np.zeros(2, bool))
 
 
 def advance_playback(
-    plan: Plan,
+    plan: NominalTrajectory,
     playback: Playback,
     plant: tuple[Acceleration, np.ndarray],
     substeps: int,

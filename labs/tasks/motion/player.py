@@ -7,7 +7,13 @@ from typing import TypeVar
 import numpy as np
 
 from labs.lab import State
-from labs.tasks.motion.playback import FEEDBACK, OPEN_LOOP, Plan, Playback, start_playback
+from labs.tasks.motion.playback import (
+    FEEDBACK,
+    OPEN_LOOP,
+    NominalTrajectory,
+    Playback,
+    start_playback,
+)
 
 PERIOD = 0.01
 """[s] A step of the world."""
@@ -19,7 +25,7 @@ REST_STEPS = 80
 class PlayerState(State):
     """The plan, and how it is being played."""
 
-    plan: Plan
+    plan: NominalTrajectory
     failed: bool = False
     """Whether the last solve ended without a solution."""
     playback: Playback
@@ -35,7 +41,7 @@ class PlayerState(State):
 S = TypeVar("S", bound=PlayerState)
 
 
-def play_from_start(state: S, plan: Plan, failed: bool) -> S:
+def play_from_start(state: S, plan: NominalTrajectory, failed: bool) -> S:
     """With another plan."""
     return replace(
         state,

@@ -35,7 +35,7 @@ WEIGHT = 0.5 * ROD * GRAVITY * LENGTH
 HALF_AMPLITUDE = 0.5
 """[m] beyond which the oscillator's damper pushes; its limit cycle reaches about twice as far."""
 
-Acceleration = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+ForcedAcceleration = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 """q, v, u, each (...), to a (...)."""
 
 
@@ -47,7 +47,7 @@ class PlaneSystem:
     title: str
     body: str
     """What moves: "mass" or "pendulum"."""
-    acceleration: Acceleration
+    acceleration: ForcedAcceleration
     slopes: Callable[[float], tuple[float, float]]
     """q to the derivatives of a(q, v, u) by q and by v at (q, 0)."""
     strength: float

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 from scipy.sparse import csc_array
 
-from labs.problems.nonlinear_program import Derivatives, Values
+from labs.problems.nonlinear_program import ProgramDerivatives, ProgramValues
 from labs.resumable import Resumable
 
 
@@ -41,13 +41,13 @@ class SmallProgram:
         self._hessian = ca.Function("h", [y, lam, mu], [ca.hessian(L, y)[0]])
         self.lower, self.upper = np.full(n, lower), np.full(n, upper)
 
-    def values(self, y: np.ndarray) -> Values:
+    def values(self, y: np.ndarray) -> ProgramValues:
         f, c, g = (np.asarray(part).ravel() for part in self._values(y))
-        return Values(float(f[0]), c, g)
+        return ProgramValues(float(f[0]), c, g)
 
-    def derivatives(self, y: np.ndarray) -> Derivatives:
+    def derivatives(self, y: np.ndarray) -> ProgramDerivatives:
         f_y, c_y, g_y = (np.asarray(part) for part in self._first(y))
-        return Derivatives(f_y.ravel(), csc_array(c_y), csc_array(g_y))
+        return ProgramDerivatives(f_y.ravel(), csc_array(c_y), csc_array(g_y))
 
     def hessian(
         self, y: np.ndarray, lam: np.ndarray, mu: np.ndarray, exact: bool

@@ -11,7 +11,7 @@ from labs.algorithms import sqp
 from labs.algorithms.collocation import Collocation
 from labs.algorithms.collocation_schemes import SCHEMES
 from labs.algorithms.curvature import weighted_curvature
-from labs.algorithms.sqp import Iterate, Options
+from labs.algorithms.sqp import SqpIterate, SqpOptions
 from labs.errors import LabError
 from labs.problems.continuous_control import ContinuousProblem
 from labs.resumable import run_to_completion
@@ -32,9 +32,9 @@ from tests.labs.algorithms.transcriptions import (
 BALL = Ball(np.array([0.35, -0.1, 0.4]), 0.1)
 
 
-def solved(problem: ContinuousProblem, N: int, scheme: str, **options: Any) -> Iterate:
+def solved(problem: ContinuousProblem, N: int, scheme: str, **options: Any) -> SqpIterate:
     program, guess = Collocation(problem, N, scheme), straight(problem, N)
-    return sqp.solve(program, program.variables(guess.X, guess.U), Options(**options))
+    return sqp.solve(program, program.variables(guess.X, guess.U), SqpOptions(**options))
 
 
 def everything(name: str) -> ContinuousProblem:
@@ -206,7 +206,7 @@ LIMITED: dict[str, tuple[str, Callable[[], ContinuousProblem]]] = {
 g, and of the final time T."""
 
 
-def active_kinds(program: Collocation, at: Iterate) -> str:
+def active_kinds(program: Collocation, at: SqpIterate) -> str:
     states, active = program.grid.states, at.active_bounds != 0.0
     n = states.shape[1] // 2
     kinds = {
@@ -328,7 +328,7 @@ def check_random_problem(seed: int) -> str:
     """What it ended with; where it says converged, Ipopt finds nothing better nearby."""
     problem, N, scheme = random_problem(seed)
     program, guess = Collocation(problem, N, scheme), straight(problem, N)
-    at = sqp.solve(program, program.variables(guess.X, guess.U), Options(iterations=100))
+    at = sqp.solve(program, program.variables(guess.X, guess.U), SqpOptions(iterations=100))
     assert at.stopped
     if not at.converged:
         assert not at.stopped.startswith("Converged")

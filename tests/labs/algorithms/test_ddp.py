@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from labs.algorithms import ddp
-from labs.algorithms.ddp import Options
+from labs.algorithms.ddp import DdpOptions
 from labs.algorithms.ddp_sweep import backward_pass
 from labs.errors import LabError
 from labs.models.discrete import Discrete
@@ -103,7 +103,7 @@ def riccati(p: OptimalControlProblem) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("second_order", [False, True])
 def test_a_linear_quadratic_problem_takes_one_step_to_riccati(second_order: bool) -> None:
     p = linear_quadratic()
-    options = Options(second_order=second_order)
+    options = DdpOptions(second_order=second_order)
     rng = np.random.default_rng(0)
     at = ddp.init(p, rng.normal(size=(30, 2)), options)
     once = ddp.step(p, options, at)
@@ -120,7 +120,7 @@ def test_a_linear_quadratic_problem_takes_one_step_to_riccati(second_order: bool
 
 
 def test_the_expected_change_holds_for_every_alpha_where_the_model_is_exact() -> None:
-    p, options = linear_quadratic(), Options()
+    p, options = linear_quadratic(), DdpOptions()
     at = ddp.init(p, np.ones((30, 2)), options)
     model = run_to_completion(expand(p, at.X, at.U, second_order=False))
     w, K = np.empty_like(at.w), np.empty_like(at.K)
@@ -146,7 +146,7 @@ def test_the_oracle_has_the_same_dynamics(name: str) -> None:
     np.testing.assert_allclose(np.array(tip_position(m)(q)).ravel(), m.tip(q), atol=1e-12)
 
 
-def compare(problem: OptimalControlProblem, U: np.ndarray, options: Options) -> None:
+def compare(problem: OptimalControlProblem, U: np.ndarray, options: DdpOptions) -> None:
     found = ddp.solve(problem, U, options)
     assert found.converged, found.stopped
     rng = np.random.default_rng(0)
@@ -162,13 +162,13 @@ def compare(problem: OptimalControlProblem, U: np.ndarray, options: Options) -> 
 @pytest.mark.parametrize("name", UPRIGHT)
 def test_swing_ups_cost_what_ipopt_finds(name: str, second_order: bool) -> None:
     p = swing_up(name)
-    compare(p, guess(p), Options(second_order=second_order, iterations=2000))
+    compare(p, guess(p), DdpOptions(second_order=second_order, iterations=2000))
 
 
 @pytest.mark.parametrize("second_order", [False, True])
 def test_a_reach_costs_what_ipopt_finds(second_order: bool) -> None:
     p, U = reach()
-    compare(p, U, Options(second_order=second_order))
+    compare(p, U, DdpOptions(second_order=second_order))
 
 
 @pytest.mark.parametrize("name", ["pendulum", "double-pendulum"])
@@ -176,7 +176,7 @@ def test_limited_controls_cost_what_ipopt_finds(name: str) -> None:
     p = swing_up(name)
     limit = {"pendulum": [3.5], "double-pendulum": [5.0, 4.0]}[name]
     bounded = replace(p, bound=np.array(limit))
-    options = Options(second_order=name == "pendulum", iterations=2000)
+    options = DdpOptions(second_order=name == "pendulum", iterations=2000)
     compare(bounded, guess(p), options)
     found = ddp.solve(bounded, guess(p), options)
     assert np.abs(found.U).max(axis=0) == pytest.approx(limit, rel=1e-12), "the limits are reached"
@@ -189,8 +189,8 @@ def test_limited_controls_cost_what_ipopt_finds(name: str) -> None:
 def gradients(second_order: bool) -> np.ndarray:
     """Of the last iterations on the pendulum, from a start near the solution."""
     p = swing_up("pendulum")
-    solved = ddp.solve(p, guess(p), Options(second_order=True))
-    options = Options(second_order=second_order, tolerance=1e-26)
+    solved = ddp.solve(p, guess(p), DdpOptions(second_order=True))
+    options = DdpOptions(second_order=second_order, tolerance=1e-26)
     at = ddp.init(p, solved.U + 1e-3, options)
     found: list[float] = []
     while len(found) < 12 and not at.stopped:
@@ -219,7 +219,7 @@ def test_ddp_converges_quadratically_and_ilqr_linearly() -> None:
 
 def test_gains_are_the_derivative_of_the_optimal_control() -> None:
     p = swing_up("cart-pole", N=30)
-    options = Options(second_order=True, iterations=1000, tolerance=1e-22)
+    options = DdpOptions(second_order=True, iterations=1000, tolerance=1e-22)
     solved = ddp.solve(p, guess(p), options)
     assert solved.gradient < 1e-7
     for k in range(4):
@@ -234,7 +234,7 @@ def test_gains_are_the_derivative_of_the_optimal_control() -> None:
 
 def test_the_cost_never_rises_and_the_ratio_is_at_least_c1() -> None:
     p = swing_up("pendulum")
-    options = Options(c1=0.2, c2=0.5)
+    options = DdpOptions(c1=0.2, c2=0.5)
     at = ddp.init(p, guess(p), options)
     accepted = 0
     while not at.stopped:
@@ -252,7 +252,7 @@ def test_the_cost_never_rises_and_the_ratio_is_at_least_c1() -> None:
 
 
 def test_iterations_leave_what_went_before_alone() -> None:
-    p, options = swing_up("pendulum"), Options()
+    p, options = swing_up("pendulum"), DdpOptions()
     first = ddp.step(p, options, ddp.init(p, guess(p), options))
     kept = [first.X.copy(), first.U.copy(), first.K.copy(), first.w.copy()]
     for _ in range(3):
@@ -269,14 +269,14 @@ def test_iterations_leave_what_went_before_alone() -> None:
 def test_a_first_guess_that_diverges_is_said() -> None:
     p = swing_up("cart-pole")
     plant = Discrete(mechanism("cart-pole"), 0.5, "explicit-euler")
-    at = ddp.init(replace(p, dynamics=plant), np.full((60, 1), 1e5), Options())
+    at = ddp.init(replace(p, dynamics=plant), np.full((60, 1), 1e5), DdpOptions())
     assert at.stopped.startswith("The first guess diverges at step ")
-    assert ddp.step(p, Options(), at) is at
+    assert ddp.step(p, DdpOptions(), at) is at
 
 
 def test_an_indefinite_hessian_raises_mu_until_it_serves() -> None:
     p = swing_up("pendulum", r=1e-3)
-    options = Options(second_order=True)
+    options = DdpOptions(second_order=True)
     at = ddp.init(p, np.zeros((60, 1)) + 2.0, options)
     raised = False
     while not at.stopped:
@@ -289,11 +289,11 @@ def test_an_indefinite_hessian_raises_mu_until_it_serves() -> None:
 def test_regularisation_at_its_limit_is_said() -> None:
     p = swing_up("pendulum")
     negative = replace(p, cost=replace(p.cost, R=-100.0 * np.eye(1)))  # type: ignore[type-var]
-    at = ddp.solve(negative, guess(p), Options(mu_limit=1.0))
+    at = ddp.solve(negative, guess(p), DdpOptions(mu_limit=1.0))
     assert not at.converged
     assert at.stopped.startswith("Failed: Q_uu is not positive definite at step 59")
     assert "limit of 2e+02" in at.stopped, "Q_uu is -200, and mu_limit in parts of its size"
-    assert at.cost == ddp.init(negative, guess(p), Options()).cost, "nothing was moved"
+    assert at.cost == ddp.init(negative, guess(p), DdpOptions()).cost, "nothing was moved"
 
 
 @pytest.mark.parametrize(
@@ -311,7 +311,7 @@ def test_a_line_search_without_end_is_said(limit: float, why: str) -> None:
     c = p.cost
     assert isinstance(c, MotionCost)
     wrong = Wrong(c.N, c.Q, c.R, c.Q_f, c.x_ref, c.u_ref)
-    at = ddp.solve(replace(p, cost=wrong), guess(p), Options(mu_limit=limit, tolerance=1e-8))
+    at = ddp.solve(replace(p, cost=wrong), guess(p), DdpOptions(mu_limit=limit, tolerance=1e-8))
     assert not at.converged
     assert at.stopped.startswith(f"Failed: the line search is exhausted: {why}")
     assert "c_1 = 0.001" in at.stopped
@@ -319,7 +319,7 @@ def test_a_line_search_without_end_is_said(limit: float, why: str) -> None:
 
 def test_too_few_iterations_are_said() -> None:
     p = swing_up("pendulum")
-    at = ddp.solve(p, guess(p), Options(iterations=3))
+    at = ddp.solve(p, guess(p), DdpOptions(iterations=3))
     assert at.iteration == 3
     assert not at.converged
     assert at.stopped.startswith("Stopped short after 3 iterations")
@@ -336,9 +336,9 @@ def test_too_few_iterations_are_said() -> None:
 )
 def test_options_out_of_range_are_said(wrong: dict[str, float], message: str) -> None:
     with pytest.raises(LabError, match=message):
-        Options(**wrong)  # type: ignore[arg-type]
+        DdpOptions(**wrong)  # type: ignore[arg-type]
 
 
 def test_a_guess_of_the_wrong_shape_is_said() -> None:
     with pytest.raises(LabError, match=r"shape \(59, 1\); N controls here are \(60, 1\)"):
-        ddp.init(swing_up("pendulum"), np.zeros((59, 1)), Options())
+        ddp.init(swing_up("pendulum"), np.zeros((59, 1)), DdpOptions())

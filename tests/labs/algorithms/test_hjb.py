@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from labs.algorithms import hjb
-from labs.algorithms.hjb import Grid, ValueFunction
+from labs.algorithms.hjb import StateGrid, ValueFunction
 from labs.errors import LabError
 from labs.optimal_control.families.systems import BLOCK_ON_A_LINE, PENDULUM
 from labs.resumable import run_to_completion
@@ -18,12 +18,12 @@ SWING = ((-1.5, -11.0), (5.0, 11.0))
 
 def mass(nodes: int, steps: int, u_max: float = 20.0) -> ValueFunction:
     of = problem(BLOCK_ON_A_LINE, (1.0, 0.0), 2.0, u_max)
-    return run_to_completion(hjb.solve(of, Grid(*WINDOW, (nodes, nodes)), steps))
+    return run_to_completion(hjb.solve(of, StateGrid(*WINDOW, (nodes, nodes)), steps))
 
 
 def pendulum(nodes: int, steps: int, u_max: float = 4.0) -> ValueFunction:
     of = problem(PENDULUM, (np.pi, 0.0), 1.0, u_max)
-    return run_to_completion(hjb.solve(of, Grid(*SWING, (nodes, nodes)), steps))
+    return run_to_completion(hjb.solve(of, StateGrid(*SWING, (nodes, nodes)), steps))
 
 
 def test_the_order_in_time_is_two() -> None:
@@ -46,7 +46,7 @@ def test_the_order_in_space_is_four() -> None:
     """Of the interpolation, off the nodes of a smooth function."""
 
     def error(nodes: int) -> float:
-        grid = Grid((0.0, 0.0), (1.0, 1.0), (nodes, nodes))
+        grid = StateGrid((0.0, 0.0), (1.0, 1.0), (nodes, nodes))
         values = np.sin(3.0 * grid.nodes[:, 0] + 1.0) * np.exp(grid.nodes[:, 1])
         V = ValueFunction(1.0, grid, np.tile(values.reshape(1, nodes, nodes), (2, 1, 1)))
         places = np.linspace(0.31, 0.69, 40)
@@ -58,7 +58,7 @@ def test_the_order_in_space_is_four() -> None:
 
 
 def test_a_kink_does_not_oscillate() -> None:
-    grid = Grid((-1.0, -1.0), (1.0, 1.0), (21, 21))
+    grid = StateGrid((-1.0, -1.0), (1.0, 1.0), (21, 21))
     values = np.where(grid.nodes[:, 0] > 0.03, 1.0, 0.0).reshape(1, 21, 21)
     V = ValueFunction(1.0, grid, np.tile(values, (2, 1, 1)))
     found = [V.value(np.array([x, 0.1]), 0.0) for x in np.linspace(-0.8, 0.8, 200)]
@@ -100,7 +100,7 @@ def test_values_are_positive_and_end_as_the_final_cost() -> None:
 
 def test_it_pauses_and_pausing_changes_nothing() -> None:
     of = problem(PENDULUM, (np.pi, 0.0), 1.0, 4.0)
-    work, pauses = hjb.solve(of, Grid(*SWING, (101, 101)), 3), 0
+    work, pauses = hjb.solve(of, StateGrid(*SWING, (101, 101)), 3), 0
     try:
         while True:
             next(work)
@@ -112,12 +112,12 @@ def test_it_pauses_and_pausing_changes_nothing() -> None:
 
 
 def test_what_it_does_not_solve_it_refuses() -> None:
-    of, grid = problem(PENDULUM, (1.0, 0.0), 1.0, 4.0), Grid(*SWING, (11, 11))
+    of, grid = problem(PENDULUM, (1.0, 0.0), 1.0, 4.0), StateGrid(*SWING, (11, 11))
     with pytest.raises(LabError, match="within finite limits"):
         run_to_completion(hjb.solve(problem(PENDULUM, (1.0, 0.0), 1.0), grid, 2))
     with pytest.raises(LabError, match="fixed T and a free end"):
         run_to_completion(hjb.solve(replace(of, x_final=np.zeros(2)), grid, 2))
     with pytest.raises(LabError, match="4 or more"):
-        Grid(*SWING, (3, 11))
+        StateGrid(*SWING, (3, 11))
     with pytest.raises(LabError, match="empty"):
-        Grid((0.0, 0.0), (1.0, 0.0), (11, 11))
+        StateGrid((0.0, 0.0), (1.0, 0.0), (11, 11))

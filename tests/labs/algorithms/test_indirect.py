@@ -11,7 +11,7 @@ from labs.algorithms.indirect import Extremal
 from labs.errors import LabError
 from labs.optimal_control.families.cost import SwingCost
 from labs.optimal_control.families.motion import first_guess
-from labs.optimal_control.families.systems import BLOCK_ON_A_LINE, PENDULUM, Body
+from labs.optimal_control.families.systems import BLOCK_ON_A_LINE, PENDULUM, UprightBody
 from labs.problems.continuous_control import ContinuousProblem, StateConstraint
 from labs.resumable import run_to_completion
 
@@ -20,7 +20,11 @@ ENDLESS = np.full(2, np.inf)
 
 
 def problem(
-    body: Body, x0: tuple[float, float], T: float, u_max: float = np.inf, cost: SwingCost = COST
+    body: UprightBody,
+    x0: tuple[float, float],
+    T: float,
+    u_max: float = np.inf,
+    cost: SwingCost = COST,
 ) -> ContinuousProblem:
     bound = np.array([u_max])
     return ContinuousProblem(body, cost, np.array(x0), T, -ENDLESS, ENDLESS, -bound, bound)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from labs.algorithms import ddp
-from labs.algorithms.ddp import Iterate, Options
+from labs.algorithms.ddp import DdpIterate, DdpOptions
 from labs.problems.optimal_control import OptimalControlProblem
 from labs.tasks.motion.cost import MotionCost
 from labs.tasks.motion.motions import MOTIONS, MotionWeights, first_guess, motion_problem
@@ -22,7 +22,7 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def limited_problem(seed: int) -> tuple[OptimalControlProblem, np.ndarray, Options]:
+def limited_problem(seed: int) -> tuple[OptimalControlProblem, np.ndarray, DdpOptions]:
     """A random one, its first guess and options; six in a row are of all systems."""
     rng = np.random.default_rng(seed)
     name = tuple(MOTIONS)[seed % len(MOTIONS)]
@@ -41,11 +41,11 @@ def limited_problem(seed: int) -> tuple[OptimalControlProblem, np.ndarray, Optio
     guess = first_guess(
         problem, np.array(MOTIONS[name].control_scale), rng.uniform(-1, 1), rng.uniform(0, 2)
     )
-    options = Options(second_order=bool(rng.integers(2)), tolerance=1e-8, iterations=300)
+    options = DdpOptions(second_order=bool(rng.integers(2)), tolerance=1e-8, iterations=300)
     return problem, guess, options
 
 
-def check_against_ipopt(problem: OptimalControlProblem, found: Iterate) -> None:
+def check_against_ipopt(problem: OptimalControlProblem, found: DdpIterate) -> None:
     wanted = optimum(problem, found.X, found.U, warm=True)
     assert problem.bound is not None
     if np.abs((wanted.U - found.U) / problem.bound).max() < NEARBY:
@@ -86,7 +86,7 @@ def swing_up() -> tuple[OptimalControlProblem, np.ndarray]:
 
 def test_a_control_a_rounding_within_its_bound_does_not_end_the_search() -> None:
     problem, guess = swing_up()
-    found = ddp.solve(problem, guess, Options(tolerance=1e-8))
+    found = ddp.solve(problem, guess, DdpOptions(tolerance=1e-8))
     assert found.converged
     assert found.cost == pytest.approx(23.607182, rel=1e-6), "as Ipopt finds"
     check_against_ipopt(problem, found)
@@ -105,7 +105,7 @@ def test_the_unit_of_the_cost_does_not_matter(second_order: bool, limited: bool)
     problem, guess = swing_up()
     if not limited:
         problem = replace(problem, bound=None)
-    options = Options(second_order=second_order, iterations=300)
+    options = DdpOptions(second_order=second_order, iterations=300)
     found = ddp.solve(problem, guess, options)
     assert found.converged
     for scale in (2.0**-50, 2.0**40):
@@ -113,7 +113,7 @@ def test_the_unit_of_the_cost_does_not_matter(second_order: bool, limited: bool)
         np.testing.assert_array_equal(scaled.U, found.U)
         assert scaled.iteration == found.iteration
         assert scaled.converged
-    begun = Options(second_order=second_order, iterations=8)
+    begun = DdpOptions(second_order=second_order, iterations=8)
     few = ddp.solve(problem, guess, begun)
     for scale in (1e-15, 1e12):
         scaled = ddp.solve(in_other_units(problem, scale), guess, begun)
@@ -126,8 +126,8 @@ def test_a_corner_that_bounds_hold_is_a_minimum_however_the_cost_curves() -> Non
     problem, guess = swing_up()
     assert problem.bound is not None
     narrow = replace(problem, bound=0.01 * problem.bound)
-    at_bound = ddp.solve(narrow, 0.01 * guess, Options(second_order=True)).U
+    at_bound = ddp.solve(narrow, 0.01 * guess, DdpOptions(second_order=True)).U
     inside = at_bound * (1.0 - 2.0**-52)
-    again = ddp.solve(narrow, inside, Options(second_order=True))
+    again = ddp.solve(narrow, inside, DdpOptions(second_order=True))
     assert again.converged
     assert again.iteration == 1

@@ -10,7 +10,7 @@ from labs.algorithms.approximation import best_fit, mean_update, td_fixed_point
 from labs.algorithms.batch_approximation import (
     REPLAY_MC,
     REPLAY_TD,
-    Transitions,
+    TransitionBatch,
     collect_transitions,
     fitted_q_iteration,
     least_squares_fit,
@@ -94,7 +94,7 @@ def test_q_learning_diverges_on_baird_s_star_while_sarsa_does_not() -> None:
     assert np.array_equal(again.w, off.w)
 
 
-def batch_of_walks(episodes: int = 200) -> Transitions:
+def batch_of_walks(episodes: int = 200) -> TransitionBatch:
     random = seeded(np.random.default_rng(0), 1)[0]
     return collect_transitions(walk_task(NINETEEN), random, episodes)
 
@@ -150,12 +150,12 @@ def test_large_batches_lead_to_the_fixed_points_of_the_chain() -> None:
     np.testing.assert_allclose(phi @ least_squares_fit(features, batch), phi @ best, atol=0.02)
 
 
-def exploring_batch(mdp: FiniteMDP, draws: int) -> Transitions:
+def exploring_batch(mdp: FiniteMDP, draws: int) -> TransitionBatch:
     """Any state, any control."""
     rng = np.random.default_rng(3)
     x, u = rng.integers(mdp.X, size=draws), rng.integers(mdp.U, size=draws)
     y = np.array([rng.choice(mdp.X, p=mdp.probabilities[b, a]) for a, b in zip(x, u, strict=True)])
-    return Transitions(x, u, mdp.C[x, u], y, np.zeros(draws))
+    return TransitionBatch(x, u, mdp.C[x, u], y, np.zeros(draws))
 
 
 def test_a_fixed_batch_teaches_the_optimum_by_a_table() -> None:
@@ -193,7 +193,7 @@ def test_what_does_not_fit_is_refused() -> None:
         step(task, good, BehaviourPolicy(FOLLOW), rule, SARSA, start, 1)
     with pytest.raises(LabError, match="no method 3"):
         step(task, good, greedy, rule, 3, start, 1)
-    empty = Transitions(*(np.zeros(0, int) for _ in range(5)))
+    empty = TransitionBatch(*(np.zeros(0, int) for _ in range(5)))
     random = seeded(np.random.default_rng(0), 1)[0]
     with pytest.raises(LabError, match="empty batch"):
         run_to_completion(replay(good, empty, 1.0, rule, REPLAY_TD, np.zeros(good.size), random, 1))
@@ -203,7 +203,7 @@ def test_what_does_not_fit_is_refused() -> None:
 def test_lstd_of_groups_of_states_is_that_of_any_features(gamma: float) -> None:
     """Solved by its band; the same features, written as a matrix, by rank."""
     batch, apart = batch_of_walks(5), vanishing(table(21), walk_task(NINETEEN).task.terminal)
-    for few in (batch, Transitions(*(column[:7] for column in batch))):  # the second is cut
+    for few in (batch, TransitionBatch(*(column[:7] for column in batch))):  # the second is cut
         for features in (apart, walk_groups()):
             dense = from_matrix(features.dense)
             for answers in (least_squares_fit, partial(lstd, gamma=gamma)):

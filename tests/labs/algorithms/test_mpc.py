@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from labs.algorithms.linear_mpc import LinearPlanner
-from labs.algorithms.mpc import Options, RecedingHorizon, init, shift, step
+from labs.algorithms.mpc import MpcOptions, RecedingHorizon, init, shift, step
 from labs.errors import LabError
 from labs.problems.linear_mpc import LinearMpcProblem
 from labs.problems.receding_horizon import Plan, Planner
@@ -24,7 +24,7 @@ def model(x: np.ndarray, u: np.ndarray) -> np.ndarray:
 
 def close_loop(
     planner: Planner,
-    options: Options,
+    options: MpcOptions,
     x: Sequence[float],
     periods: int,
     brake: np.ndarray = REST,
@@ -59,7 +59,7 @@ class Spy:
 
 def test_the_first_control_acts_and_the_rest_is_the_next_guess() -> None:
     spy = Spy(PROBLEM)
-    X, U, seen = close_loop(spy, Options(), [1.5, 0.2], 25)
+    X, U, seen = close_loop(spy, MpcOptions(), [1.5, 0.2], 25)
     assert np.abs(X[-1]).max() < 0.05
     for t, at in enumerate(seen):
         assert at.plan is not None
@@ -75,16 +75,18 @@ def test_the_first_control_acts_and_the_rest_is_the_next_guess() -> None:
     assert guess.U[-1] == 0.0
     np.testing.assert_allclose(guess.X[-1], model(plan.X[-1], REST))
     np.testing.assert_array_equal(guess.active["control"][:-1], plan.active["control"][1:])
-    _, same, _ = close_loop(LinearPlanner(PROBLEM), Options(warm=False), [1.5, 0.2], 25)
+    _, same, _ = close_loop(LinearPlanner(PROBLEM), MpcOptions(warm=False), [1.5, 0.2], 25)
     np.testing.assert_allclose(same, U, atol=1e-10)
-    options = Options(last="repeated")
+    options = MpcOptions(last="repeated")
     repeated = shift(plan, 2, model, options)
     assert repeated is not None
     np.testing.assert_array_equal(repeated.U[-3:, 0], np.repeat(plan.U[-1], 3))
     assert shift(plan, len(plan.U), model, options) is None
     warm, cold = (
         sum(
-            s.plan.iterations for s in close_loop(spy, Options(warm=w), [1.5, 0.2], 25)[2] if s.plan
+            s.plan.iterations
+            for s in close_loop(spy, MpcOptions(warm=w), [1.5, 0.2], 25)[2]
+            if s.plan
         )
         for w in (True, False)
     )
@@ -95,7 +97,7 @@ def test_a_horizon_that_shrinks_does_as_planned_and_one_that_recedes_does_not() 
     """Bellman's principle; without a terminal cost the plans differ."""
     for shrink_from, same in ((10, True), (None, False)):
         spy = Spy(DOUBLE_INTEGRATOR)
-        X, _, seen = close_loop(spy, Options(shrink_from=shrink_from), [1.0, 0.0], 10)
+        X, _, seen = close_loop(spy, MpcOptions(shrink_from=shrink_from), [1.0, 0.0], 10)
         first = seen[0].plan
         assert first is not None
         assert np.allclose(X, first.X, atol=1e-9) == same
@@ -105,37 +107,37 @@ def test_a_horizon_that_shrinks_does_as_planned_and_one_that_recedes_does_not() 
         assert len(guess.U) == (7 if same else 10)
     # After its end it begins anew.
     spy = Spy(DOUBLE_INTEGRATOR)
-    close_loop(spy, Options(shrink_from=3), [1.0, 0.0], 5)
+    close_loop(spy, MpcOptions(shrink_from=3), [1.0, 0.0], 5)
     assert [N for *_, N in spy.asked] == [3, 2, 1, 3, 2]
 
 
 @pytest.mark.parametrize("delay", [1, 3])
 def test_a_delay_that_is_compensated_only_shifts_the_run(delay: int) -> None:
     planner, x = LinearPlanner(PROBLEM), np.array([1.2, 0.1])
-    X, U, seen = close_loop(planner, Options(delay=delay), x.tolist(), 30)
+    X, U, seen = close_loop(planner, MpcOptions(delay=delay), x.tolist(), 30)
     np.testing.assert_array_equal(U[:delay], 0.0)
     for _ in range(delay):
         x = model(x, REST)
-    prompt, _, _ = close_loop(planner, Options(), x.tolist(), 30 - delay)
+    prompt, _, _ = close_loop(planner, MpcOptions(), x.tolist(), 30 - delay)
     np.testing.assert_allclose(X[delay:], prompt, atol=1e-9)
     assert seen[-1].committed.shape == (delay, 1)
 
 
 def test_a_delay_that_is_not_compensated_acts_late() -> None:
-    options = Options(delay=2, compensate=False)
+    options = MpcOptions(delay=2, compensate=False)
     spy = Spy(PROBLEM)
     X, U, _ = close_loop(spy, options, [1.2, 0.1], 30)
     for t in range(5):
         np.testing.assert_array_equal(spy.asked[t][0], X[t])
         late = run_to_completion(LinearPlanner(PROBLEM).plan(X[t], None))
         np.testing.assert_allclose(U[t + 2], late.U[0], atol=1e-10)
-    prompt, _, _ = close_loop(spy, Options(delay=2), [1.2, 0.1], 30)
+    prompt, _, _ = close_loop(spy, MpcOptions(delay=2), [1.2, 0.1], 30)
     assert np.abs(X).sum() > 1.05 * np.abs(prompt).sum()
 
 
 def test_without_a_plan_the_last_goes_on_or_the_brake_acts() -> None:
     missing, brake = (4, 5, 6), np.array([0.3])
-    _, U, seen = close_loop(Spy(PROBLEM, missing), Options(), [1.5, 0.2], 9, brake)
+    _, U, seen = close_loop(Spy(PROBLEM, missing), MpcOptions(), [1.5, 0.2], 9, brake)
     plan = seen[3].plan
     assert plan is not None
     np.testing.assert_array_equal(U[3:7], plan.U[:4])
@@ -145,22 +147,22 @@ def test_without_a_plan_the_last_goes_on_or_the_brake_acts() -> None:
     assert "plan of 3 periods before goes on" in seen[6].status
     assert not seen[7].status
     assert seen[8].failures == 3
-    braking = Options(fallback="brake")
+    braking = MpcOptions(fallback="brake")
     _, U, seen = close_loop(Spy(PROBLEM, missing), braking, [1.5, 0.2], 9, brake)
     np.testing.assert_array_equal(U[4:7], 0.3)
     assert "Instead the brake acts." in seen[5].status
     # After its end a plan has no rest.
-    _, U, seen = close_loop(Spy(PROBLEM, range(1, 20)), Options(), [1.5, 0.2], 12, brake)
+    _, U, seen = close_loop(Spy(PROBLEM, range(1, 20)), MpcOptions(), [1.5, 0.2], 12, brake)
     np.testing.assert_array_equal(U[10:], 0.3)
     assert "the brake acts" in seen[10].status
-    _, U, seen = close_loop(Spy(PROBLEM, range(20)), Options(), [1.5, 0.2], 3, brake)
+    _, U, seen = close_loop(Spy(PROBLEM, range(20)), MpcOptions(), [1.5, 0.2], 3, brake)
     np.testing.assert_array_equal(U, 0.3)
     assert seen[-1].plan is None
 
 
 def test_periods_in_which_nothing_is_planned_follow_the_plan() -> None:
     spy = Spy(PROBLEM)
-    _, U, seen = close_loop(spy, Options(), [1.5, 0.2], 8, held=(1, 2, 3))
+    _, U, seen = close_loop(spy, MpcOptions(), [1.5, 0.2], 8, held=(1, 2, 3))
     plan = seen[0].plan
     assert plan is not None
     np.testing.assert_array_equal(U[:4], plan.U[:4])
@@ -170,6 +172,6 @@ def test_periods_in_which_nothing_is_planned_follow_the_plan() -> None:
 
 def test_wrong_options_say_what_is_allowed() -> None:
     with pytest.raises(LabError, match="0 or more"):
-        Options(delay=-1)
+        MpcOptions(delay=-1)
     with pytest.raises(LabError, match="1 or more"):
-        Options(shrink_from=0)
+        MpcOptions(shrink_from=0)

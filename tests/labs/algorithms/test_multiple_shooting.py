@@ -10,7 +10,7 @@ from labs.algorithms import riccati, sqp
 from labs.algorithms.multiple_shooting import MultipleShooting
 from labs.algorithms.shooting_steps import SHOOTING_METHODS
 from labs.algorithms.single_shooting import SingleShooting
-from labs.algorithms.sqp import Iterate, Options
+from labs.algorithms.sqp import SqpIterate, SqpOptions
 from labs.errors import LabError
 from labs.problems.continuous_control import ContinuousProblem
 from labs.problems.linear_quadratic import LqrProblem
@@ -34,9 +34,9 @@ BALL = Ball(np.array([0.35, -0.1, 0.4]), 0.1)
 
 def solved(
     problem: ContinuousProblem, N: int, segments: int, M: int = 1, **options: Any
-) -> tuple[MultipleShooting, Iterate]:
+) -> tuple[MultipleShooting, SqpIterate]:
     program, guess = MultipleShooting(problem, N, segments, M), straight(problem, N)
-    return program, sqp.solve(program, program.variables(guess.X, guess.U), Options(**options))
+    return program, sqp.solve(program, program.variables(guess.X, guess.U), SqpOptions(**options))
 
 
 def everything(name: str, rng: np.random.Generator) -> ContinuousProblem:
@@ -237,7 +237,7 @@ def test_a_guess_that_diverges_has_no_value() -> None:
     assert np.isfinite(program.values(z).f)
     z[program.segments.controls[3]] = 1e12
     assert program.values(z).f == np.inf
-    assert sqp.init(program, z, Options()).stopped.startswith("Failed: the first guess diverges")
+    assert sqp.init(program, z, SqpOptions()).stopped.startswith("Failed: the first guess diverges")
 
 
 def test_uneven_segments_are_split_with_the_longer_ones_first_and_named() -> None:

@@ -10,7 +10,7 @@ from labs.algorithms import sqp
 from labs.algorithms.multiple_shooting import MultipleShooting
 from labs.algorithms.nonlinear_mpc import NonlinearMpc
 from labs.algorithms.nonlinear_mpc_problem import NonlinearMpcProblem
-from labs.algorithms.sqp import Options
+from labs.algorithms.sqp import SqpOptions
 from labs.errors import LabError
 from labs.models.discrete import Discrete
 from labs.models.mechanisms import mechanism
@@ -82,7 +82,7 @@ def test_it_solves_what_multiple_shooting_and_sqp_solve() -> None:
     whole = ContinuousProblem(body, cost, x0, N * H, -x_upper, x_upper, -u_upper, u_upper)
     shooting = MultipleShooting(whole, N, N, 1, "explicit-euler")
     guess = shooting.variables(np.tile(x0, (N + 1, 1)), np.zeros((N, 2)))
-    other = sqp.solve(shooting, guess, Options(hessian="gauss-newton", tolerance=1e-9))
+    other = sqp.solve(shooting, guess, SqpOptions(hessian="gauss-newton", tolerance=1e-9))
     assert other.converged
     dynamics = Discrete(body, H, "explicit-euler")
     limits = (-x_upper, x_upper, -u_upper, u_upper)

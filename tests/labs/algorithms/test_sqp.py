@@ -9,19 +9,19 @@ import pytest
 from scipy.sparse import csc_array
 
 from labs.algorithms import sqp
-from labs.algorithms.sqp import Options
+from labs.algorithms.sqp import SqpOptions
 from labs.algorithms.sqp_bfgs import LARGEST_GROUP, first
 from labs.algorithms.sqp_convexity import convexify, is_positive_definite
 from labs.algorithms.sqp_qp_solver import QpSolver
 from labs.algorithms.sqp_subproblem import (
-    Answer,
     Subproblem,
+    SubproblemSolution,
     Unsolved,
     least_violation,
     solve_subproblem,
 )
 from labs.errors import LabError
-from labs.problems.nonlinear_program import Values
+from labs.problems.nonlinear_program import ProgramValues
 from tests.labs.algorithms.small_programs import PUBLISHED, SmallProgram
 
 
@@ -29,7 +29,7 @@ from tests.labs.algorithms.small_programs import PUBLISHED, SmallProgram
 @pytest.mark.parametrize("number", PUBLISHED)
 def test_published_optima_are_found(number: str, hessian: str) -> None:
     published = PUBLISHED[number]
-    found = sqp.solve(published.program, np.array(published.start), Options(hessian))
+    found = sqp.solve(published.program, np.array(published.start), SqpOptions(hessian))
     assert found.converged, found.stopped
     assert found.stopped.startswith(f"Converged after {found.iteration} iteration")
     assert found.values.f == pytest.approx(published.optimum, rel=1e-7, abs=1e-7)
@@ -59,7 +59,7 @@ def test_the_active_set_is_told() -> None:
 @pytest.mark.parametrize("number", ["7", "71", "100"])
 def test_near_a_solution_the_number_of_right_digits_doubles(number: str) -> None:
     """With exact second derivatives; the KKT residual tells."""
-    published, options = PUBLISHED[number], Options("exact", tolerance=1e-13)
+    published, options = PUBLISHED[number], SqpOptions("exact", tolerance=1e-13)
     at, residuals = sqp.init(published.program, np.array(published.start), options), []
     while not at.stopped:
         at = sqp.step(published.program, options, at)
@@ -133,10 +133,10 @@ def test_bounds_that_cross_are_infeasible() -> None:
     program = circle(1.0)
     program.lower[0] = 2.0
     program.upper[0] = 1.0
-    at = sqp.init(program, np.zeros(2), Options())
+    at = sqp.init(program, np.zeros(2), SqpOptions())
     assert at.infeasible
     assert at.stopped == "Infeasible: the lower bound of y_1 is above its upper one."
-    assert sqp.step(program, Options(), at) is at
+    assert sqp.step(program, SqpOptions(), at) is at
 
 
 class Diverging(SmallProgram):
@@ -144,7 +144,7 @@ class Diverging(SmallProgram):
 
     edge = 1.0
 
-    def values(self, y: np.ndarray) -> Values:
+    def values(self, y: np.ndarray) -> ProgramValues:
         values = super().values(y)
         return values._replace(f=np.inf) if y[0] > self.edge else values
 
@@ -169,7 +169,7 @@ def test_a_programme_that_has_no_value_further_on_fails_in_a_sentence() -> None:
 
 def test_it_stops_short_at_the_limit_and_goes_on_from_there() -> None:
     published = PUBLISHED["100"]
-    options = Options(iterations=2)
+    options = SqpOptions(iterations=2)
     at = sqp.solve(published.program, np.array(published.start), options)
     assert not at.converged
     assert at.stopped.startswith("Stopped short after 2 iterations: KKT residual")
@@ -186,11 +186,11 @@ def test_the_same_guess_gives_the_same_digits() -> None:
 
 def test_wrong_use_is_said() -> None:
     with pytest.raises(LabError, match=r"the first guess has shape \(3,\); .* takes \(2,\)"):
-        sqp.init(circle(1.0), np.zeros(3), Options())
+        sqp.init(circle(1.0), np.zeros(3), SqpOptions())
     with pytest.raises(LabError, match="no Hessian is named 'newton'; there are gauss-newton"):
-        Options("newton")
+        SqpOptions("newton")
     with pytest.raises(LabError, match="tolerance = 0"):
-        Options(tolerance=0.0)
+        SqpOptions(tolerance=0.0)
     with pytest.raises(LabError, match=f"{LARGEST_GROUP} are the most: choose Gauss-Newton"):
         first(csc_array(np.ones((LARGEST_GROUP + 1, LARGEST_GROUP + 1))))
 
@@ -229,7 +229,7 @@ def test_a_hessian_convex_along_the_constraints_is_made_convex_without_bending_t
     G = csc_array((0, 3))
     qp = Subproblem(convex.P, q, A, np.array([0.7]), G, np.zeros(0), -none, none)
     found = solve_subproblem(qp, QpSolver())
-    assert isinstance(found, Answer)
+    assert isinstance(found, SubproblemSolution)
     kkt = np.block([[H, A.toarray().T], [A.toarray(), np.zeros((1, 1))]])
     newton = np.linalg.solve(kkt, np.r_[-q, 0.7])
     np.testing.assert_allclose(found.p, newton[:3], atol=1e-8)
@@ -270,8 +270,8 @@ def test_what_the_solver_cannot_read_is_not_trusted() -> None:
 
 def test_a_restart_keeps_multipliers_that_fit() -> None:
     at = sqp.solve(circle(1.0), np.zeros(2))
-    warm = sqp.restart(circle(1.2), at, Options())
+    warm = sqp.restart(circle(1.2), at, SqpOptions())
     np.testing.assert_array_equal(warm.lam, at.lam)
     assert sqp.solve(circle(1.2), warm.y).converged
-    other = sqp.restart(PUBLISHED["7"].program, replace(at, lam=np.zeros(4)), Options())
+    other = sqp.restart(PUBLISHED["7"].program, replace(at, lam=np.zeros(4)), SqpOptions())
     assert len(other.lam) == 1

@@ -6,9 +6,9 @@ from scipy.sparse import csc_array
 
 from labs.algorithms import sqp, sqp_active_set, sqp_subproblem
 from labs.algorithms.collocation import Collocation
-from labs.algorithms.sqp import Options
+from labs.algorithms.sqp import SqpOptions
 from labs.algorithms.sqp_active_set import ActiveSet, active_set, solve_active
-from labs.algorithms.sqp_qp_solver import QpSolver, QuadraticProgram, Solution
+from labs.algorithms.sqp_qp_solver import QpSolution, QpSolver, QuadraticProgram
 from labs.tasks.motion.continuous import MotionLimits, continuous_motion
 from tests.labs.algorithms.transcriptions import straight
 
@@ -36,7 +36,7 @@ def staged(rng: np.random.Generator) -> QuadraticProgram:
     return QuadraticProgram(*sparse, np.full(STAGES, 0.3), lower, upper)
 
 
-def interior(qp: QuadraticProgram) -> Solution:
+def interior(qp: QuadraticProgram) -> QpSolution:
     found = QpSolver().solve(qp, TOLERANCE)
     assert found.x is not None
     return found
@@ -49,7 +49,7 @@ def changed(active: ActiveSet, at: int) -> ActiveSet:
     return active._replace(bounds=bounds)
 
 
-def is_optimal(qp: QuadraticProgram, found: Solution) -> None:
+def is_optimal(qp: QuadraticProgram, found: QpSolution) -> None:
     """By all conditions of optimality, to more digits than an interior point has."""
     assert found.x is not None
     stationary = qp.P @ found.x + qp.q + qp.A.T @ found.y + qp.G.T @ found.z + found.z_bounds
@@ -136,7 +136,7 @@ def test_an_active_set_that_settled_is_not_sought_again(monkeypatch: pytest.Monk
     N = 40
     problem = continuous_motion("pendulum", "weighted", 2.0, limits=MotionLimits(control=0.6))
     program, guess = Collocation(problem, N, "trapezoidal"), straight(problem, N)
-    y, options = program.variables(guess.X, guess.U), Options("gauss-newton")
+    y, options = program.variables(guess.X, guess.U), SqpOptions("gauss-newton")
     at = sqp.solve(program, y, options)
     assert at.converged
     assert at.settled
@@ -151,7 +151,7 @@ def test_an_active_set_that_settled_is_not_sought_again(monkeypatch: pytest.Monk
     asked: list[float] = []
     solve = QpSolver.solve
 
-    def counted(self: QpSolver, *arguments: object) -> Solution:
+    def counted(self: QpSolver, *arguments: object) -> QpSolution:
         asked.append(1.0)
         return solve(self, *arguments)  # type: ignore[arg-type]
 

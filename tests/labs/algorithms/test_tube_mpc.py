@@ -137,8 +137,10 @@ def test_receding_horizon_control_acts_by_the_tubes_gain() -> None:
     example = published()
     x = np.array([-3.1, 0.4])
     expected = run_to_completion(example.planner.values(x[None])).u[0]
-    start = mpc.init(mpc.Options(), np.zeros(1))
-    at = run_to_completion(mpc.step(example.planner, _model, mpc.Options(), start, x, np.zeros(1)))
+    start = mpc.init(mpc.MpcOptions(), np.zeros(1))
+    at = run_to_completion(
+        mpc.step(example.planner, _model, mpc.MpcOptions(), start, x, np.zeros(1))
+    )
     np.testing.assert_allclose(at.u, expected, atol=1e-12)
     plan = run_to_completion(example.planner.plan(x, None))
     assert abs(expected - plan.U[0]).max() > 1e-3, "the nominal state starts elsewhere"

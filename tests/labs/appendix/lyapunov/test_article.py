@@ -9,8 +9,8 @@ import pytest
 from labs.appendix.lyapunov.closed_loop import FAR, stopped
 from labs.appendix.lyapunov.lab import Lyapunov, LyapunovState
 from labs.appendix.lyapunov.params import LyapunovParams
-from labs.appendix.lyapunov.runs import Runs
-from labs.appendix.lyapunov.study import Study
+from labs.appendix.lyapunov.runs import StateEnsemble
+from labs.appendix.lyapunov.study import LyapunovAnalysis
 from labs.lab import Inputs, Snapshot
 from labs.params import Value
 from tests.labs.experiments import Experiments
@@ -37,13 +37,13 @@ def after(seconds: float, setting: Settings, **others: Value) -> LyapunovState:
     return _after(seconds, tuple({**setting, **others}.items()))
 
 
-def study(setting: Settings, **others: Value) -> Study:
+def study(setting: Settings, **others: Value) -> LyapunovAnalysis:
     found = after(0.0, setting, **others).study
     assert found is not None
     return found
 
 
-def runs(seconds: float, setting: Settings, **others: Value) -> Runs:
+def runs(seconds: float, setting: Settings, **others: Value) -> StateEnsemble:
     found = after(seconds, setting, **others).runs
     assert found is not None
     return found

@@ -16,7 +16,7 @@ from labs.optimal_control.brachistochrone.race import (
     LINE,
     OPTIMISED,
     YOURS,
-    Race,
+    BeadRace,
     race_of,
 )
 from labs.params import Value
@@ -39,7 +39,7 @@ def state(world: World) -> BrachistochroneState:
     return world.state
 
 
-def race(world: World) -> Race:
+def race(world: World) -> BeadRace:
     return race_of(world.params, state(world).history.nodes)  # type: ignore[arg-type]
 
 

@@ -8,14 +8,14 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from labs.optimal_control.brachistochrone import curves
-from labs.optimal_control.brachistochrone.descent import Descent, Motion, descend
+from labs.optimal_control.brachistochrone.descent import BeadMotion, Descent, descend
 
 G = 9.81
 ZIGZAG = np.array([[0.0, 0.0], [0.3, 0.9], [0.1, 1.0], [2.0, 1.2], [2.2, 0.8]])
 """Steep, back, level, and up again."""
 
 
-def at(descent: Descent, t: float) -> Motion:
+def at(descent: Descent, t: float) -> BeadMotion:
     return descent.at(np.array([t]))
 
 

@@ -3,7 +3,7 @@
 from labs.engine.headless import run
 from labs.engine.run import World
 from labs.optimal_control.direct_methods.lab import DirectMethodsState
-from labs.optimal_control.direct_methods.race import Race
+from labs.optimal_control.direct_methods.race import Entrants
 from tests.labs.solving import Settings as Settings
 from tests.labs.solving import solved_world
 
@@ -14,7 +14,7 @@ def solved(setting: Settings) -> World:
     return solved_world("direct-methods", setting)
 
 
-def race(setting: Settings) -> Race:
+def race(setting: Settings) -> Entrants:
     return state(solved(setting)).race
 
 
@@ -23,11 +23,11 @@ def state(world: World) -> DirectMethodsState:
     return world.state
 
 
-def iterations(found: Race) -> list[int]:
+def iterations(found: Entrants) -> list[int]:
     return [found[name].history.iterations for name in NAMES]
 
 
-def costs(found: Race) -> list[float]:
+def costs(found: Entrants) -> list[float]:
     return [float(found[name].history.cost[-1]) for name in NAMES]
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labs.optimal_control.families.motion import Motion
+from labs.optimal_control.families.motion import MethodMotion
 from labs.optimal_control.families.systems import PENDULUM
 from tests.labs.experiments import Experiments
 from tests.labs.optimal_control.families.simulation import (
@@ -121,7 +121,7 @@ def test_costate_gradient_and_multipliers_are_one_curve(setting: Settings) -> No
     fine = solved({**setting, "intervals": 120.0, "nodes": 201.0, "hjb_steps": 100.0})
     assert measured(fine)["gradient_gap"] == pytest.approx(1.2, abs=0.05)
     assert measured(fine)["multiplier_gap"] == pytest.approx(0.2, abs=0.05)
-    best: Motion = results(world).motions["pontryagin"]
+    best: MethodMotion = results(world).motions["pontryagin"]
     u = np.clip(-best.P[:, 1] / (2.0 * 0.2 * PENDULUM.inertia), -4.0, 4.0)
     np.testing.assert_allclose(best.U, u, atol=1e-9)
     rough = results(world).gradients["dp"] - best.P

@@ -26,7 +26,7 @@ from tests.labs.optimal_control.families.simulation import (
 
 
 def test_a_table_serves_every_start() -> None:
-    def table(angle: float) -> global_methods.Table:
+    def table(angle: float) -> global_methods.CostToGoTable:
         parts = global_methods.make_table(FamiliesParams(angle=angle), "hjb", 21)
         *_, last = (part for part in parts if part)
         assert last.table is not None

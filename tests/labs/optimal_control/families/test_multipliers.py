@@ -14,7 +14,7 @@ from labs.optimal_control.families.local_methods import (
     motion_of_iterate,
     optimise_directly,
 )
-from labs.optimal_control.families.motion import Motion, first_guess
+from labs.optimal_control.families.motion import MethodMotion, first_guess
 from labs.optimal_control.families.params import FamiliesParams
 from labs.problems.continuous_control import ContinuousProblem
 
@@ -22,7 +22,7 @@ PARAMS = FamiliesParams(system="mass", horizon=2.0)
 OPTIMUM = replace(OPTIONS, tolerance=1e-11)
 
 
-def optimum(problem: ContinuousProblem, N: int) -> tuple[Motion, Collocation, sqp.Iterate]:
+def optimum(problem: ContinuousProblem, N: int) -> tuple[MethodMotion, Collocation, sqp.SqpIterate]:
     program = Collocation(problem, N, "trapezoidal")
     start = program.variables(np.tile(problem.x0, (N + 1, 1)), np.zeros((N, 1)))
     at = sqp.solve(program, start, OPTIMUM)

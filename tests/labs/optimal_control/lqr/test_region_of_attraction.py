@@ -8,7 +8,7 @@ from labs.optimal_control.lqr.region_of_attraction import (
     SMALL_ANGLE,
     SYSTEM_CODES,
     TIME_LIMIT,
-    ClosedLoop,
+    RegulatedSystem,
     grid_axes,
     state_derivative,
 )
@@ -17,9 +17,11 @@ from labs.optimal_control.lqr.regulator import RegulatorSettings, regulator
 WEIGHTS = (10.0, 10.0, 1.0, 1.0)
 
 
-def loop(system: str, limit: float = np.inf, policy: str = "steady", n: int = 80) -> ClosedLoop:
+def loop(
+    system: str, limit: float = np.inf, policy: str = "steady", n: int = 80
+) -> RegulatedSystem:
     law = regulator(RegulatorSettings(system, 0.02, WEIGHTS, 0.1, n, "q", 0.0, policy))
-    return ClosedLoop(system, 0.02, law.gains[:, 0], limit)
+    return RegulatedSystem(system, 0.02, law.gains[:, 0], limit)
 
 
 @pytest.mark.parametrize("name", SYSTEM_CODES)
@@ -31,7 +33,7 @@ def test_the_closed_form_is_the_mechanism(name: str) -> None:
         np.testing.assert_allclose(state_derivative(name, x, u[0]), mechanism.f(x, u), atol=1e-11)
 
 
-def brought_back(closed: ClosedLoop, dx: np.ndarray) -> bool:
+def brought_back(closed: RegulatedSystem, dx: np.ndarray) -> bool:
     """By the simulation of the scene: within reach all the time, and at rest in the end."""
     system = linear_system(closed.system)
     x, u = system.x_eq + dx, np.zeros(1)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labs.engine.run import World
-from labs.optimal_control.mpc_stability.closed_loop import Run
+from labs.optimal_control.mpc_stability.closed_loop import ClosedLoopRun
 from labs.params import Value
 from tests.labs.solving import readouts, solved_world
 
@@ -20,7 +20,7 @@ class Outcome:
     world: World
     tiles: Mapping[str, float]
     notes: Mapping[str, str]
-    run: Run
+    run: ClosedLoopRun
 
 
 def simulate(setting: Settings, seconds: float) -> Outcome:

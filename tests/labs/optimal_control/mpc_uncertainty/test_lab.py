@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labs.algorithms.linear_mpc import LinearPlanner, Values
+from labs.algorithms.linear_mpc import LinearPlanner, OptimalValues
 from labs.algorithms.tube_mpc import TubePlanner, Tubes
 from labs.engine.catalog import find
 from labs.engine.run import World
@@ -69,7 +69,7 @@ def test_feasible_sets_hold_just_the_states_from_which_there_are_plans(source: s
     states = phase_plane(UncertaintyParams()).grid(15, 19).reshape(-1, 2)
     planners: list[LinearPlanner | TubePlanner] = [*chosen.planners, chosen.tube_planner]
     for name, corners, planner in zip(NAMES, chosen.feasible, planners, strict=True):
-        answers: Resumable[Values | Tubes] = planner.values(states)
+        answers: Resumable[OptimalValues | Tubes] = planner.values(states)
         found = np.isfinite(run_to_completion(answers).V)
         edges = np.roll(corners, -1, axis=0) - corners
         away = states[:, None] - corners

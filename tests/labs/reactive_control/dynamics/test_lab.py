@@ -12,13 +12,13 @@ from labs.lab import Inputs
 from labs.models.plant import plant
 from labs.params import Value
 from labs.reactive_control.dynamics.equation import plant_under_gravity
-from labs.reactive_control.dynamics.lab import SPEED_LIMIT, Dynamics, DynamicsState
+from labs.reactive_control.dynamics.lab import SPEED_LIMIT, ArmDynamics, DynamicsState
 from labs.reactive_control.dynamics.params import DynamicsParams
 from labs.scene import NullScene
 from labs.tasks.arm.postures import POSED_ARMS
 from tests.labs.experiments import Experiments
 
-LAB = Dynamics()
+LAB = ArmDynamics()
 ARTICLE = Experiments("labs.reactive_control", "dynamics")
 FALL: Mapping[str, Value] = {
     "robot": "double-pendulum",

@@ -22,10 +22,10 @@ from labs.reactive_control.joint_control.sampled_stability import (
     GROWTH_TOLERANCE,
     LinearisedRobot,
     LinearLoop,
-    LoopSettings,
+    LoopParameters,
 )
 
-DEFAULT = LoopSettings("pd-gravity", Gains(200.0, 0.0, 30.0), 1e-3, "semi-implicit-euler", 1e-3)
+DEFAULT = LoopParameters("pd-gravity", Gains(200.0, 0.0, 30.0), 1e-3, "semi-implicit-euler", 1e-3)
 UNSTABLE = {
     "gains": replace(DEFAULT, controller="pid", gains=Gains(200.0, 2000.0, 10.0)),
     "period": replace(DEFAULT, control_period=0.02, integrator="rk4"),
@@ -44,7 +44,7 @@ def linear(robot: str = "ur5", payload: float = 0.0, friction: float = 0.0) -> L
     )
 
 
-def growth_of_the_robot(setting: LoopSettings, start: float, seconds: float) -> float:
+def growth_of_the_robot(setting: LoopParameters, start: float, seconds: float) -> float:
     """Measured on the nonlinear UR5 by the power method: the growth rate of a tiny deviation
     from rest at home, scaled back to `start` after every control period."""
     world = plant("ur5")
@@ -202,7 +202,7 @@ def test_a_proposed_gain_is_no_more_cautious_than_its_margin() -> None:
                 assert not robustly_stable([loop], outside)
 
 
-DIVERGING_BY_DAMPING = LoopSettings("pid", Gains(330.0, 0.0, 60.0), 0.01, "explicit-euler", 0.01)
+DIVERGING_BY_DAMPING = LoopParameters("pid", Gains(330.0, 0.0, 60.0), 0.01, "explicit-euler", 0.01)
 """With explicit Euler at 10 ms too little damping is as bad as too much."""
 
 
@@ -240,7 +240,7 @@ def test_a_loop_that_needs_its_motors_to_survive_the_integrator_is_not_proposed(
     """Friction of 19 at the wrist and explicit Euler with 10 ms: M - h b < -M. Stiff feedback
     makes the linear loop stable, and with a motor at its limit it is not."""
     loop = linear(payload=2.8, friction=18.8)
-    setting = LoopSettings("pid", Gains(1000.0, 0.0, 0.5), 0.002, "explicit-euler", 0.01)
+    setting = LoopParameters("pid", Gains(1000.0, 0.0, 0.5), 0.002, "explicit-euler", 0.01)
     assert loop.growth(setting) < -1.0
     assert loop.growth(replace(setting, controller="open-loop")) > 10.0
     assert not robustly_stable([loop], setting)

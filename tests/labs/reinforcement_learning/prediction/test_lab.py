@@ -7,7 +7,7 @@ import pytest
 
 from labs.engine.catalog import find
 from labs.engine.run import World
-from labs.reinforcement_learning.prediction.lab import Prediction
+from labs.reinforcement_learning.prediction.lab import PredictionLab
 from labs.reinforcement_learning.prediction.params import PredictionParams
 from labs.reinforcement_learning.prediction.targets import sample_targets
 from tests.labs.experiments import Experiments
@@ -176,7 +176,7 @@ def test_all_experiments_are_verified() -> None:
 
 def test_the_preset_of_the_pendulum_comes_near_the_truth() -> None:
     """By its steps both methods get rid of most of what they did not know, 6.05 at first."""
-    world = solved_world("prediction", dict(Prediction.presets["Pendulum under PD"]))
+    world = solved_world("prediction", dict(PredictionLab.presets["Pendulum under PD"]))
     errors = world.state.training["error"]
     assert (errors[:, -1] < 2.0).all()
     assert (errors[:, -1] < 0.4 * errors[:, 0]).all()

@@ -9,14 +9,14 @@ from labs.reinforcement_learning.td_control.tasks import (
     KP,
     LARGEST_GAMMA,
     PENDULUM,
-    LearningTask,
+    ControlTask,
     grid_task,
     pendulum_task,
 )
 from labs.tasks.grid_world.map import MAPS, GridWorld
 
 
-def residual(task: LearningTask) -> float:
+def residual(task: ControlTask) -> float:
     """How far Q* is from a fixed point of Bellman's optimality equation, where it is finite."""
     value = task.q_star.min(axis=1)
     known = np.isfinite(task.q_star).all(axis=1)

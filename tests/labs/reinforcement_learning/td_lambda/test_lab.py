@@ -18,7 +18,7 @@ from labs.lab import Inputs
 from labs.params import Value
 from labs.reinforcement_learning.td_lambda.lab import TdLambda
 from labs.reinforcement_learning.td_lambda.live import (
-    Steps,
+    PartialEpisode,
     credit,
     draw_episode,
     learned,
@@ -223,7 +223,7 @@ def test_walking_learns_what_the_algorithms_learn(method: str, offline: bool, sy
 def test_n_step_td_learns_as_its_costs_come() -> None:
     """Of four states in a row, n = 2: x_0 after two costs, x_1 after three, the rest at the end."""
     params = some_params(method="n-step", n=2, alpha=0.5)
-    steps = Steps(np.array([10, 9, 8, 9, 0]), np.array([1.0, 2.0, 3.0, 4.0]))
+    steps = PartialEpisode(np.array([10, 9, 8, 9, 0]), np.array([1.0, 2.0, 3.0, 4.0]))
     V = np.where(np.arange(21) % 20 == 0, 0.0, 0.1 * np.arange(21))
     moved = [
         np.flatnonzero(learned(params.place, "n-step", params.rule("n-step"), V, done) != V)
@@ -272,7 +272,7 @@ def test_weights_and_returns_make_the_target(method: str, ahead: int) -> None:
     assert weights.sum() == pytest.approx(float(ahead > 0))
     if 0 < ahead < 10 and method != "true-online":
         states = np.r_[np.arange(10, 10 - ahead, -1), 0]
-        steps = Steps(states, np.arange(1.0, ahead + 1.0), ahead)
+        steps = PartialEpisode(states, np.arange(1.0, ahead + 1.0), ahead)
         V = np.linspace(0.0, 1.0, 21) * place.inside
         returns = n_step_returns(0.9, V, steps)
         target = learned(place, method, rule, V, steps)[10]

@@ -10,25 +10,25 @@ from labs.algorithms.collocation import Collocation
 from labs.models.mechanisms import mechanism
 from labs.scene import NullScene
 from labs.tasks.direct.guesses import first_guess, resampled
-from labs.tasks.direct.history import ARC_POINTS, KEPT, History
+from labs.tasks.direct.history import ARC_POINTS, KEPT, IterationHistory
 from labs.tasks.direct.params import GUESSES, DirectParams
 from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots, joined
 from labs.tasks.direct.plan_params import SOFT_WEIGHT
 from labs.tasks.direct.player import DirectState, advanced, dragged, measured, replayed
 from labs.tasks.direct.systems import TITLES, reaching_posture, system
 from labs.tasks.direct.tracking import playable
-from labs.tasks.direct.trajectory import Trajectory
+from labs.tasks.direct.trajectory import PiecewiseTrajectory
 from labs.tasks.motion.playback import FEEDBACK, OPEN_LOOP, start_playback
 
 T = 2.0
 
 
-def pushed(k: int = 8) -> Trajectory:
+def pushed(k: int = 8) -> PiecewiseTrajectory:
     """The mass under u = 3 t - 1, exactly."""
     t = np.linspace(0.0, T, k + 1)
     X = np.stack([0.5 * t**3 - 0.5 * t**2, 1.5 * t**2 - t], axis=1)
     u = 3.0 * t - 1.0
-    return Trajectory(T, X, X[1:], np.stack([u[:-1], u[1:]], axis=1)[:, :, None])
+    return PiecewiseTrajectory(T, X, X[1:], np.stack([u[:-1], u[1:]], axis=1)[:, :, None])
 
 
 def test_a_cubic_is_interpolated_exactly() -> None:
@@ -119,7 +119,7 @@ def solved(params: DirectParams, N: int = 40) -> DirectState:
     program = Collocation(params.problem, N, "trapezoidal")
     at = sqp.init(program, program.variables(*first_guess(params, N)), params.options)
     motions = [_motion(program, at)]
-    history = History.start(params, at, motions[0])
+    history = IterationHistory.start(params, at, motions[0])
     while not at.stopped:
         at = sqp.step(program, params.options, at)
         motions.append(_motion(program, at))
@@ -136,10 +136,10 @@ def solved(params: DirectParams, N: int = 40) -> DirectState:
     return replayed(state, motions[-1], plan, history, failed=False)
 
 
-def _motion(program: Collocation, at: sqp.Iterate) -> Trajectory:
+def _motion(program: Collocation, at: sqp.SqpIterate) -> PiecewiseTrajectory:
     T, X, U = program.trajectory(at.y)
     both = np.stack([U[:-1], U[1:]], axis=1)
-    return Trajectory(T, X, X[1:] - program.defects(at.values.c), both)
+    return PiecewiseTrajectory(T, X, X[1:] - program.defects(at.values.c), both)
 
 
 def test_a_plan_is_played_and_the_regulator_holds_it() -> None:

@@ -14,7 +14,7 @@ from labs.errors import LabError
 from labs.problems.finite_mdp import random_policy
 from labs.reinforcement_learning.dynamic_programming.params import DynamicProgrammingParams
 from labs.reinforcement_learning.td_control.params import TdParams
-from labs.tasks.mdp_table.table import Table, parse_table
+from labs.tasks.mdp_table.table import MdpTable, parse_table
 
 CHAIN = "state, cost, A, B\nA, 1, 1/2, 0.5\nB, 0, 0, 1\n"
 DECISION = """state, control, cost, A, B
@@ -29,7 +29,7 @@ ROWS = [
 ]
 
 
-def same(a: Table, b: Table) -> bool:
+def same(a: MdpTable, b: MdpTable) -> bool:
     return (
         (a.states, a.controls) == (b.states, b.controls)
         and np.array_equal(a.P, b.P)

@@ -11,7 +11,7 @@ from labs.tasks.motion.playback import (
     LARGEST_VELOCITY,
     OPEN_LOOP,
     SUBSTEP,
-    Plan,
+    NominalTrajectory,
     Playback,
     advance_playback,
     jump_states,
@@ -19,14 +19,16 @@ from labs.tasks.motion.playback import (
 )
 
 
-def random_plan(name: str, h: float, N: int = 12) -> Plan:
+def random_plan(name: str, h: float, N: int = 12) -> NominalTrajectory:
     moved, rng = mechanism(name), np.random.default_rng(2)
     U = rng.normal(size=(N, moved.nu))
     X = Discrete(moved, h, "rk4").rollout(np.zeros(moved.nx), U)
-    return Plan(X, U, rng.normal(size=(N, moved.nu, moved.nx)), h)
+    return NominalTrajectory(X, U, rng.normal(size=(N, moved.nu, moved.nx)), h)
 
 
-def play(plan: Plan, plant: Mechanism, substeps: int = 2, **changes: np.ndarray) -> Playback:
+def play(
+    plan: NominalTrajectory, plant: Mechanism, substeps: int = 2, **changes: np.ndarray
+) -> Playback:
     runs, held = start_playback(plan), np.zeros(plant.nu)
     while not runs.finished(plan):
         runs = advance_playback(plan, runs, (plant.acceleration(held), held), substeps, **changes)
@@ -78,7 +80,7 @@ def test_a_blow_changes_both() -> None:
 
 def test_a_run_that_diverges_stops_alone() -> None:
     plan, plant = random_plan("pendulum", 0.01, N=40), mechanism("pendulum")
-    wild = Plan(plan.X, plan.U, np.full_like(plan.K, 1e6), plan.h)
+    wild = NominalTrajectory(plan.X, plan.U, np.full_like(plan.K, 1e6), plan.h)
     noise = np.full((2, 2), 1e-3)
     runs = play(wild, plant, 2, noise=noise)
     np.testing.assert_array_equal(runs.diverged, [True, False])

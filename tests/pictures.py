@@ -39,7 +39,7 @@ def main() -> None:
         page = browser.new_page(viewport=WINDOW if options.page else CARD_WINDOW)
         page.add_init_script("localStorage.setItem('graphics', 'high')")
         page.goto(f"{server.address}/labs/{options.lab}?{urlencode(query)}")
-        page.wait_for_selector("#curtain.open", state="attached", timeout=60_000)
+        page.wait_for_selector("#loading.done", state="attached", timeout=60_000)
         page.wait_for_timeout(20_000)  # software rendering takes its time over the first meshes
         _run_to(page, options.seconds)
         if options.page:

@@ -221,7 +221,7 @@ TABLES: Mapping[type, Callable[[Any, _Arrays], _Table]] = {
 
 
 def _fill(text: str, data: _Arrays, k: int | None = None) -> str:
-    """A label with its words, as the page has it (static/js/plots/labels.js)."""
+    """A label with its words, as the page has it (static/js/plots/placeholders.js)."""
 
     def word(match: re.Match[str]) -> str:
         if not match[1]:

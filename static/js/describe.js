@@ -5,12 +5,12 @@ const EVERY = 2000; // [ms]
 
 export function describeScene(host) {
   setInterval(() => {
-    const words = sceneInWords();
+    const words = sceneDescription();
     if (host.textContent !== words) host.textContent = words;
   }, EVERY);
 }
 
-function sceneInWords() {
+function sceneDescription() {
   const clock = text(document.querySelector("#clock"));
   const numbers = [...document.querySelectorAll("#tiles .tile")].map(
     (tile) => `${text(tile.querySelector("span"))}: ${text(tile.querySelector("div"))}`,

@@ -2,7 +2,7 @@
 // the page tells what to look for, and where. Where a prediction is asked for, guessing starts it
 // as well, and guess and outcome are set side by side.
 
-import { Prediction } from "./predict.js";
+import { Prediction } from "./prediction.js";
 import { PHONE } from "./sheet.js"; // where the card itself grows, and keeps its place
 
 export class Experiments {
@@ -31,9 +31,9 @@ export class Experiments {
     const wanted = (this.wanted = { ...this.defaults, ...set });
     this.reached = false;
     this.before = this.latest;
-    this.predictions[i]?.takePending();
+    this.predictions[i]?.commitPendingGuess();
     const done = await this.apply(set, run);
-    for (const prediction of this.predictions) prediction?.putAway();
+    for (const prediction of this.predictions) prediction?.closeSketch();
     if (this.wanted !== wanted) return; // another has begun, or the settings have moved on
     if (!done) return this.leave();
     for (const other of this.cards) other.classList.toggle("current", other === card);

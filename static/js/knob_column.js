@@ -14,7 +14,7 @@ export class KnobColumn {
     this.column = document.getElementById("knobs");
     this.gathered = []; // [row, the comment that keeps its place]
     this.box = document.querySelector("#knobs .gathered");
-    PHONE.addEventListener("change", () => this.scatter());
+    PHONE.addEventListener("change", () => this.restoreRows());
     this.memory = `folded ${lab.slug}`;
     this.groups = [...document.querySelectorAll("#knobs .group:not(.gathered)")];
     const folded = storedData(this.memory, []);
@@ -34,10 +34,10 @@ export class KnobColumn {
 
   // A parameter that does not act keeps its value, out of sight.
   show() {
-    const turned = this.tunables.filter((tunable) => rowOf(tunable.name).hidden === acts(tunable, this.values));
-    for (const { name } of turned) rowOf(name).hidden = !rowOf(name).hidden;
+    const turned = this.tunables.filter((tunable) => findRow(tunable.name).hidden === acts(tunable, this.values));
+    for (const { name } of turned) findRow(name).hidden = !findRow(name).hidden;
     this.hideEmpty();
-    if (turned.some(({ name }) => rowOf(name).classList.contains("set"))) this.reveal();
+    if (turned.some(({ name }) => findRow(name).classList.contains("set"))) this.reveal();
   }
 
   hideEmpty() {
@@ -46,16 +46,16 @@ export class KnobColumn {
 
   // Marks the knobs an experiment has set, and brings them into view.
   highlight(names) {
-    for (const { name } of this.tunables) rowOf(name).classList.toggle("set", names.includes(name));
+    for (const { name } of this.tunables) findRow(name).classList.toggle("set", names.includes(name));
     if (names.length) this.reveal();
     else this.release();
   }
 
   reveal() {
-    this.scatter();
+    this.restoreRows();
     const set = [...document.querySelectorAll(".knob.set:not([hidden])")]; // as they stand
     for (const row of set) row.closest("details")?.setAttribute("open", "");
-    if (set.length > 1 && !PHONE.matches && !this.fits(set)) this.gather(set);
+    if (set.length > 1 && !PHONE.matches && !this.fits(set)) this.collectRows(set);
     set.at(-1)?.scrollIntoView({ block: "nearest" });
     set[0]?.scrollIntoView({ block: "nearest" });
   }
@@ -66,7 +66,7 @@ export class KnobColumn {
     return span < this.column.clientHeight - ROOM;
   }
 
-  gather(rows) {
+  collectRows(rows) {
     this.gathered = rows.map((row) => {
       const place = document.createComment("");
       row.replaceWith(place);
@@ -80,13 +80,13 @@ export class KnobColumn {
 
   // Back to their groups, but not out of the hand that has just moved one.
   release() {
-    if (!this.box.contains(document.activeElement)) return this.scatter();
+    if (!this.box.contains(document.activeElement)) return this.restoreRows();
     this.box.addEventListener("focusout", () => setTimeout(() => {
       if (!document.querySelector(".knob.set")) this.release();
     }), { once: true });
   }
 
-  scatter() {
+  restoreRows() {
     for (const [row, place] of this.gathered) place.replaceWith(row);
     this.gathered = [];
     this.box.hidden = true;
@@ -100,6 +100,6 @@ export function acts({ when }, values) {
   return when.some((choices) => Object.entries(choices).every(([name, allowed]) => allowed.includes(values[name])));
 }
 
-function rowOf(name) {
+function findRow(name) {
   return document.getElementById(`param-${name}`);
 }

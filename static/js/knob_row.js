@@ -1,7 +1,7 @@
 // One row of a knob: its name, its track and its value, in the column of knobs or beside a symbol
 // of the article. All rows of a parameter go through `Knobs`.
 
-import { plain } from "./format.js";
+import { plainNumber } from "./format.js";
 import { positionOf, stepped, valueAt } from "./scales.js";
 import { wireTextFile } from "./text_file.js";
 
@@ -88,7 +88,7 @@ export class KnobRow {
     if (tunable.kind === "toggle") field.checked = value;
     else if (tunable.kind === "choice") field.value = tunable.options.findIndex((option) => option.value === value);
     else if (tunable.kind === "text") field.value = value;
-    else field.value = plain(value);
+    else field.value = plainNumber(value);
     if (!track) return;
     const position = positionOf(tunable, value);
     track.value = position;

@@ -2,7 +2,7 @@
 
 import { KnobRow } from "./knob_row.js";
 
-const PATIENCE = 700; // [ms] an own change may take to come back before the stream is believed again
+const OWN_CHANGE_TIME = 700; // [ms] an own change may take to come back before the stream is believed again
 
 export class Knobs {
   constructor(lab, change) {
@@ -38,7 +38,7 @@ export class Knobs {
   async drag(name, value, by = null) {
     const entry = this.entries.get(name);
     for (const row of entry.rows) row.write(value);
-    entry.until = performance.now() + PATIENCE;
+    entry.until = performance.now() + OWN_CHANGE_TIME;
     const underWay = entry.wanted !== undefined;
     entry.wanted = value;
     if (underWay) return;
@@ -54,7 +54,7 @@ export class Knobs {
     const entry = this.entries.get(name);
     by?.mark("");
     if (value === this.values[name]) return by?.write(value);
-    entry.until = performance.now() + PATIENCE;
+    entry.until = performance.now() + OWN_CHANGE_TIME;
     try {
       await this.change({ [name]: value });
     } catch (error) {

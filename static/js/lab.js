@@ -2,19 +2,19 @@
 
 import { describeScene } from "./describe.js";
 import { Experiments } from "./experiments.js";
+import { FigureExport } from "./figures/figure_export.js";
 import { printFigures } from "./figures/printing.js";
-import { Saving } from "./figures/saving.js";
 import { wireKeyboard } from "./keyboard.js";
 import { KnobColumn } from "./knob_column.js";
 import { Knobs } from "./knobs.js";
-import { linkOf, readLink, writeLink } from "./link.js";
+import { buildLink, readLink, writeLink } from "./link.js";
 import { wireMenus } from "./menus.js";
-import { Board } from "./plots/board.js";
+import { PlotBoard } from "./plots/board.js";
 import { onViewChange, view, wirePreferences } from "./preferences.js";
 import { ROOT } from "./root.js";
 import { Session } from "./session.js";
-import { SolverRow } from "./solver.js";
 import { Sheets } from "./sheet.js";
+import { SolverRow } from "./solver.js";
 import { wireSplitters } from "./splitters.js";
 import { Stage } from "./stage.js";
 import { Symbols } from "./symbols.js";
@@ -25,7 +25,7 @@ import { noteVisit } from "./visits.js";
 const lab = JSON.parse(document.getElementById("lab-data").textContent);
 const session = new Session(lab, document.getElementById("robot"), readLink(), view);
 const stage = new Stage();
-const board = new Board(lab, () => session.fresh);
+const board = new PlotBoard(lab, () => session.fresh);
 const transport = new Transport(send);
 const solver = new SolverRow(send, loadSolution);
 const knobs = new Knobs(lab, (changes) => session.change(changes));
@@ -33,9 +33,9 @@ const column = new KnobColumn(lab, knobs);
 const symbols = new Symbols(lab, knobs);
 const experiments = new Experiments(lab, apply, board, (names) => column.highlight(names));
 let link = location.href;
-let leftOut = {}; // by name: what is too long for it
-new Saving(board, aboutFigure, () => session.info?.id);
-printFigures(() => board.shelf.shown, aboutFigure);
+let omittedTexts = {}; // by name: what is too long for it
+new FigureExport(board, figureContext, () => session.info?.id);
+printFigures(() => board.plotTabs.shown, figureContext);
 
 // A command whose refusal is said at the bottom of the page. Tells whether it was done.
 async function send(command) {
@@ -61,10 +61,10 @@ const actions = {
   loadSolution: () => solver.choose(),
   reset: () => send({ command: "reset" }),
   defaults: () => apply({}),
-  faster: () => transport.faster(1),
-  slower: () => transport.faster(-1),
+  faster: () => transport.changeSpeed(1),
+  slower: () => transport.changeSpeed(-1),
   clear: () => board.clear(),
-  share: () => copy(address(), "Link copied: it opens this lab with these parameters.", leftOutOfLink()),
+  share: () => copy(address(), "Link copied: it opens this lab with these parameters.", omissionNote()),
   command: copyCommand,
   full: () => stage.fullScreen(),
   view: () => send({ command: "reset_view" }),
@@ -78,13 +78,13 @@ function address() {
 }
 
 // A sentence on what the link lacks, if anything.
-function leftOutOfLink() {
-  const names = lab.params.filter(({ name }) => name in leftOut).map(({ label }) => label);
+function omissionNote() {
+  const names = lab.params.filter(({ name }) => name in omittedTexts).map(({ label }) => label);
   return names.length ? ` Without ${names.join(", ")}, too long for a link: pass that text on beside it.` : "";
 }
 
 // What a figure says beneath its plots.
-function aboutFigure() {
+function figureContext() {
   const iteration = solver.status?.iteration;
   return { lab, params: knobs.values, seed: session.want.seed, t: board.time, iteration, link: address() };
 }
@@ -176,8 +176,8 @@ session.addEventListener("status", ({ detail: status }) => {
   column.show();
   symbols.show();
   board.choose(status.params);
-  ({ link, left: leftOut } = linkOf(lab.params, status.params, status.seed));
-  writeLink(link, leftOut);
+  ({ link, left: omittedTexts } = buildLink(lab.params, status.params, status.seed));
+  writeLink(link, omittedTexts);
   if (status.trouble) {
     stage.say(status.trouble, { warn: true, buttons: { Reset: actions.reset, Defaults: actions.defaults } });
   } else if (!recovering) {

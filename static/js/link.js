@@ -2,19 +2,19 @@
 // and the seed. Opened elsewhere, it shows the same.
 
 const MOST = 100; // texts, and letters of a name, that the server takes
-const LONGEST = 64;
+const MAX_NAME_LENGTH = 64;
 
 const LONGEST_LINK = 8000; // characters that every server and proxy takes
 
 // The server knows what the texts mean, and says what is wrong with them.
 export function readLink() {
   const texts = [...new URLSearchParams(location.search)].slice(0, MOST);
-  const said = Object.fromEntries(texts.map(([name, text]) => [name.slice(0, LONGEST), text]));
+  const said = Object.fromEntries(texts.map(([name, text]) => [name.slice(0, MAX_NAME_LENGTH), text]));
   return { ...said, ...history.state?.left };
 }
 
 // The link, and by name what it leaves out: the longest texts, where they do not fit.
-export function linkOf(tunables, params, seed) {
+export function buildLink(tunables, params, seed) {
   const said = {}, left = {};
   for (const { name, default: standard } of tunables) {
     if (name in params && params[name] !== standard) said[name] = String(params[name]);

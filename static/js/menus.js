@@ -17,7 +17,7 @@ export function wireMenus() {
     menu.addEventListener("toggle", ({ newState }) => {
       const open = newState === "open";
       for (const button of buttons) button.setAttribute("aria-expanded", String(open && button === opener));
-      if (open) place(menu, opener);
+      if (open) placeBeside(menu, opener);
     });
     menu.addEventListener("click", (event) => {
       if (menu.classList.contains("list") && event.target.closest("button")) menu.hidePopover();
@@ -30,7 +30,7 @@ export function wireMenus() {
 }
 
 // Below the button, or above where there is no room; never off the screen.
-export function place(box, anchor) {
+export function placeBeside(box, anchor) {
   const at = anchor.getBoundingClientRect();
   const { offsetWidth: width, offsetHeight: height } = box;
   const below = at.bottom + GAP;

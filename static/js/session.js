@@ -8,10 +8,10 @@ import { ROOT } from "./root.js";
 
 const BACKOFF = [500, 1000, 2000, 3500, 5000]; // [ms]
 const FULL_RETRY = 10000;
-const PATIENCE = 3000; // What takes longer is explained.
+const PREPARING_DELAY = 3000; // What takes longer is explained.
 const FRAME = 16; // [ms]
-const PATIENCE_FOR_ANSWER = 15000; // A worker is given ten seconds.
-const SILENCE = 8000; // A live stream speaks twice a second; after this it is taken for dead.
+const ANSWER_TIMEOUT = 15000; // A worker is given ten seconds.
+const SILENCE_TIMEOUT = 8000; // A live stream speaks twice a second; after this it is taken for dead.
 
 export class Session extends EventTarget {
   constructor(lab, frame, link, view) {
@@ -50,7 +50,7 @@ export class Session extends EventTarget {
     this.news = news;
     this.emit("phase", { phase: "worker", text: news });
     const { params, link, seed } = this.want;
-    const waiting = setInterval(() => this.reportPreparing(), PATIENCE);
+    const waiting = setInterval(() => this.reportPreparing(), PREPARING_DELAY);
     const { status, data } = await request("POST", "api/sessions", {
       lab: this.lab.slug, params, link, seed, view: this.view(),
     });
@@ -195,7 +195,7 @@ export class Session extends EventTarget {
   }
 
   checkSilence() {
-    if (this.socket && performance.now() - this.heard > SILENCE) this.reconnect();
+    if (this.socket && performance.now() - this.heard > SILENCE_TIMEOUT) this.reconnect();
   }
 
   drop() {
@@ -252,7 +252,7 @@ export class Session extends EventTarget {
     let timer;
     const error = await new Promise((done) => {
       this.answers.set(ref, done);
-      timer = setTimeout(done, PATIENCE_FOR_ANSWER, "The server does not answer.");
+      timer = setTimeout(done, ANSWER_TIMEOUT, "The server does not answer.");
     });
     clearTimeout(timer);
     this.answers.delete(ref);

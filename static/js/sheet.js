@@ -46,8 +46,8 @@ export class Sheets {
     const card = PHONE.matches ? (sketching ?? current) : null;
     const own = (selector, sheet) => (card && this.open !== sheet ? [...document.querySelectorAll(selector)] : []);
     const wanted = [
-      ...(sketching ? [] : own(".tile.marked", "board")),
-      ...own(".plot:is(.watched, .sketched)", "board"),
+      ...(sketching ? [] : own(".tile.marked", "plot-board")),
+      ...own(".plot:is(.watched, .sketched)", "plot-board"),
       ...(sketching ? [] : own(".knob.set", "knobs")),
     ];
     const there = this.lent.map(([element]) => element);

@@ -5,7 +5,7 @@ import { element } from "./plots/card.js";
 import { Chart } from "./plots/chart.js";
 
 const BINS = 120; // places along the time axis
-const AT_THE_END = 0.97; // of the axis: lifted there, the sketch is finished
+const END_FRACTION = 0.97; // of the axis: lifted there, the sketch is finished
 
 export class Sketch {
   // `done` hears the curve {x [s], y}, or null once it is given up.
@@ -20,7 +20,7 @@ export class Sketch {
     this.chart = new Chart(this.pad, () => this.draw());
     this.pad.addEventListener("pointerdown", (event) => this.begin(event));
     this.pad.addEventListener("pointermove", (event) => this.move(event));
-    this.pad.addEventListener("pointerup", () => this.lift());
+    this.pad.addEventListener("pointerup", () => this.endStroke());
     this.pad.addEventListener("pointercancel", () => (this.last = null));
     this.controls = this.buttons();
     this.legend = legend;
@@ -82,10 +82,10 @@ export class Sketch {
     this.draw();
   }
 
-  lift() {
+  endStroke() {
     const at = this.last?.[0] ?? 0;
     this.last = null;
-    if (at >= AT_THE_END * BINS && this.curve()) this.done(this.curve());
+    if (at >= END_FRACTION * BINS && this.curve()) this.done(this.curve());
   }
 
   // The curve so far, gaps bridged; null while there is nothing to compare.
@@ -108,7 +108,7 @@ export class Sketch {
 }
 
 // How far a run {t, y} is from a sketched curve: the root mean square over the times sketched.
-export function distance({ x, y }, run) {
+export function rmsDistance({ x, y }, run) {
   let sum = 0;
   let count = 0;
   let i = 0;

@@ -1,7 +1,7 @@
 // The solver's own controls. What they show is what the server says, never what was wished.
 
 const EVERY = 60; // [ms] between two looks back while the thumb is dragged
-const HOLD = 700; // [ms] a thumb let go is not yet moved by what the server said a moment ago
+const SLIDER_HOLD = 700; // [ms] a thumb let go is not yet moved by what the server said a moment ago
 
 export class SolverRow {
   constructor(send, load) {
@@ -18,7 +18,7 @@ export class SolverRow {
     this.file = document.getElementById("solution-file");
     this.enabled = false;
     this.status = null;
-    this.slider.addEventListener("input", () => this.look());
+    this.slider.addEventListener("input", () => this.showIteration());
     this.pace.addEventListener("change", () => this.send({ command: "solver_pace", pace: Number(this.pace.value) }));
     this.file.addEventListener("change", () => {
       const [file] = this.file.files;
@@ -45,7 +45,7 @@ export class SolverRow {
   }
 
   // While the thumb moves: the latest place wins, a few times a second.
-  look() {
+  showIteration() {
     this.moved = performance.now();
     this.count.textContent = this.slider.value;
     this.timer ??= setTimeout(() => {
@@ -58,7 +58,7 @@ export class SolverRow {
     if (!this.row || !status) return;
     this.status = status;
     const { iteration, latest, kept, running, pace } = status;
-    if (!(performance.now() - this.moved < HOLD)) {
+    if (!(performance.now() - this.moved < SLIDER_HOLD)) {
       this.slider.min = kept ? kept[0] : 0;
       this.slider.max = kept ? kept[1] : 0;
       this.slider.value = iteration;

@@ -7,7 +7,7 @@ import { storeData, storedData } from "./store.js";
 const KEY = "layout";
 const STEP = 0.02;
 
-// By name: the part it resizes, and its least and largest share of the desk.
+// By name: the part it resizes, and its least and largest share of the layout.
 const BORDERS = {
   article: { part: ".reading", least: 0.2, most: 0.42 },
   knobs: { part: ".knobs", least: 0.13, most: 0.28 },
@@ -15,18 +15,18 @@ const BORDERS = {
 };
 
 export function wireSplitters() {
-  const desk = document.querySelector(".desk");
+  const layout = document.querySelector(".layout");
   const kept = storedData(KEY, {});
-  for (const splitter of desk.querySelectorAll("[role=separator]")) {
-    new Splitter(splitter, desk, kept);
+  for (const splitter of layout.querySelectorAll("[role=separator]")) {
+    new Splitter(splitter, layout, kept);
   }
 }
 
 class Splitter {
-  constructor(splitter, desk, kept) {
+  constructor(splitter, layout, kept) {
     this.name = splitter.dataset.border;
-    Object.assign(this, { splitter, desk, kept, ...BORDERS[this.name] });
-    this.sized = desk.querySelector(this.part);
+    Object.assign(this, { splitter, layout, kept, ...BORDERS[this.name] });
+    this.sized = layout.querySelector(this.part);
     this.across = splitter.getAttribute("aria-orientation") === "vertical";
     splitter.setAttribute("aria-valuemin", Math.round(100 * this.least));
     splitter.setAttribute("aria-valuemax", Math.round(100 * this.most));
@@ -37,35 +37,35 @@ class Splitter {
     new ResizeObserver(() => splitter.setAttribute("aria-valuenow", Math.round(100 * this.share))).observe(this.sized);
   }
 
-  // Of the desk, that the part has now.
+  // Of the layout, that the part has now.
   get share() {
-    const { sized, desk } = this;
-    return this.across ? sized.offsetWidth / desk.offsetWidth : sized.offsetHeight / desk.offsetHeight;
+    const { sized, layout } = this;
+    return this.across ? sized.offsetWidth / layout.offsetWidth : sized.offsetHeight / layout.offsetHeight;
   }
 
   put(share) {
     const within = Math.min(this.most, Math.max(this.least, share));
-    this.desk.style.setProperty(`--${this.name}`, `${(100 * within).toFixed(2)}%`);
-    this.desk.dataset[this.name] = "set";
+    this.layout.style.setProperty(`--${this.name}`, `${(100 * within).toFixed(2)}%`);
+    this.layout.dataset[this.name] = "set";
     this.kept[this.name] = within;
   }
 
-  keep() {
+  storeShares() {
     storeData(KEY, this.kept);
   }
 
   reset() {
-    this.desk.style.removeProperty(`--${this.name}`);
-    delete this.desk.dataset[this.name];
+    this.layout.style.removeProperty(`--${this.name}`);
+    delete this.layout.dataset[this.name];
     delete this.kept[this.name];
-    this.keep();
+    this.storeShares();
   }
 
   grab(event) {
     if (event.button !== 0) return;
     event.preventDefault();
     this.splitter.focus({ preventScroll: true });
-    const place = (at) => (this.across ? at.clientX / this.desk.offsetWidth : at.clientY / this.desk.offsetHeight);
+    const place = (at) => (this.across ? at.clientX / this.layout.offsetWidth : at.clientY / this.layout.offsetHeight);
     const begin = { share: this.share, at: place(event) };
     // The scene, a page of its own, would swallow the pointer.
     document.documentElement.classList.add("splitting");
@@ -74,7 +74,7 @@ class Splitter {
     const end = () => {
       document.documentElement.classList.remove("splitting");
       this.splitter.removeEventListener("pointermove", move);
-      this.keep();
+      this.storeShares();
     };
     this.splitter.addEventListener("pointermove", move);
     this.splitter.addEventListener("lostpointercapture", end, { once: true });
@@ -88,6 +88,6 @@ class Splitter {
     else return;
     event.preventDefault();
     event.stopPropagation();
-    this.keep();
+    this.storeShares();
   }
 }

@@ -1,10 +1,10 @@
-// What stands over the scene: the curtain while a session starts, and the banner in trouble.
+// What stands over the scene: the loading overlay while a session starts, and the banner in trouble.
 
 const STEPS = ["worker", "robot", "live"];
 
 export class Stage {
   constructor() {
-    this.curtain = document.getElementById("curtain");
+    this.loading = document.getElementById("loading");
     this.steps = [...document.querySelectorAll("#steps li")];
     this.banner = document.getElementById("banner");
     this.said = "";
@@ -16,19 +16,19 @@ export class Stage {
     this.steps.forEach((step, i) => {
       step.className = i < at || phase === "live" ? "done" : i === at ? "now" : "";
     });
-    this.curtain.classList.toggle("open", phase === "live");
-    this.curtain.querySelector(".once").hidden = true;
+    this.loading.classList.toggle("done", phase === "live");
+    this.loading.querySelector(".once").hidden = true;
     this.hold(false);
   }
 
   // The first start takes longer than any other.
   prepare() {
-    this.curtain.querySelector(".once").hidden = false;
+    this.loading.querySelector(".once").hidden = false;
   }
 
   // The start has to wait: nothing turns that is not under way.
   hold(yes) {
-    this.curtain.querySelector(".progress").classList.toggle("held", yes);
+    this.loading.querySelector(".progress").classList.toggle("held", yes);
   }
 
   // The scene with its controls and one plot on the whole screen, and back.

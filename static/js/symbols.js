@@ -1,16 +1,16 @@
 // A symbol in the article is its knob: pointing at it, a tap or Enter opens its row in place;
 // dragged sideways it changes its value; and it can show that value in the formula.
 
-import { short } from "./format.js";
+import { shortNumber } from "./format.js";
 import { acts } from "./knob_column.js";
-import { place } from "./menus.js";
+import { placeBeside } from "./menus.js";
 import { store, stored } from "./store.js";
 import { positionOf, valueAt } from "./scales.js";
 
 const LENGTH = 240; // [px] that a drag takes from one end of a track to the other
-const SLACK = 5; // [px] before a press becomes a drag
-const DWELL = 150; // [ms] the mouse rests before the row opens,
-const LEAVE = 300; // and is away before it closes
+const DRAG_THRESHOLD = 5; // [px] before a press becomes a drag
+const OPEN_DELAY = 150; // [ms] the mouse rests before the row opens,
+const CLOSE_DELAY = 300; // and is away before it closes
 
 export class Symbols {
   constructor(lab, knobs) {
@@ -24,8 +24,8 @@ export class Symbols {
   }
 
   listen() {
-    const on = (target, type, listener) => target.addEventListener(type, (event) => listener(event, markAt(event)));
-    on(this.article, "pointerover", (event, mark) => mark && event.pointerType === "mouse" && this.later(DWELL, () => this.open(mark)));
+    const on = (target, type, listener) => target.addEventListener(type, (event) => listener(event, symbolAt(event)));
+    on(this.article, "pointerover", (event, mark) => mark && event.pointerType === "mouse" && this.schedule(OPEN_DELAY, () => this.open(mark)));
     on(this.article, "pointerout", () => this.leave());
     on(this.article, "pointerdown", (event, mark) => mark && event.button === 0 && this.press(event, mark));
     on(this.article, "click", (event, mark) => mark && !this.dragged && this.open(mark, true));
@@ -35,8 +35,8 @@ export class Symbols {
     on(this.box, "pointerenter", () => clearTimeout(this.timer));
     on(this.box, "pointerleave", () => this.leave());
     on(this.box, "focusout", () => this.leave());
-    on(this.box, "keydown", (event) => event.key === "Escape" && this.giveBack());
-    on(document, "pointerdown", (event) => !this.box.contains(event.target) && markAt(event) !== this.mark && this.close());
+    on(this.box, "keydown", (event) => event.key === "Escape" && this.returnFocus());
+    on(document, "pointerdown", (event) => !this.box.contains(event.target) && symbolAt(event) !== this.mark && this.close());
     document.addEventListener("scroll", () => this.follow(), { capture: true, passive: true });
     addEventListener("resize", () => this.follow());
   }
@@ -48,7 +48,7 @@ export class Symbols {
     if (mark !== this.mark) {
       this.close();
       const name = mark.dataset.param;
-      const element = copyOf(document.getElementById(`param-${name}`));
+      const element = cloneRow(document.getElementById(`param-${name}`));
       const idle = document.createElement("p");
       idle.className = "idle";
       idle.textContent = "Without effect under the present choices.";
@@ -59,7 +59,7 @@ export class Symbols {
       this.row.mark("");
       this.box.hidden = false;
       mark.classList.add("open");
-      place(this.box, mark);
+      placeBeside(this.box, mark);
     }
     this.pinned ||= pinned;
   }
@@ -75,13 +75,13 @@ export class Symbols {
     this.box.replaceChildren();
   }
 
-  later(time, action) {
+  schedule(time, action) {
     clearTimeout(this.timer);
     this.timer = setTimeout(action, time);
   }
 
   leave() {
-    this.later(LEAVE, () => {
+    this.schedule(CLOSE_DELAY, () => {
       if (!this.pinned && !this.box.contains(document.activeElement)) this.close();
     });
   }
@@ -92,7 +92,7 @@ export class Symbols {
     const { top, bottom } = this.mark.getBoundingClientRect();
     const view = this.article.getBoundingClientRect();
     if (bottom < Math.max(0, view.top) || top > Math.min(innerHeight, view.bottom)) this.close();
-    else place(this.box, this.mark);
+    else placeBeside(this.box, this.mark);
   }
 
   onKey(event, mark) {
@@ -104,7 +104,7 @@ export class Symbols {
   }
 
   // The focus goes back to the symbol, which then stays closed.
-  giveBack() {
+  returnFocus() {
     const { mark } = this;
     this.close();
     this.returning = true;
@@ -124,7 +124,7 @@ export class Symbols {
     document.addEventListener("pointermove", (event) => {
       if (event.pointerId !== pointerId) return;
       const moved = event.clientX - clientX;
-      if (!this.dragged && Math.abs(moved) < SLACK) return;
+      if (!this.dragged && Math.abs(moved) < DRAG_THRESHOLD) return;
       this.dragged = true;
       this.open(mark, true);
       if (!this.row.field.disabled) this.knobs.drag(name, valueAt(tunable, start + moved / LENGTH), this.row);
@@ -152,19 +152,19 @@ export class Symbols {
       const value = this.knobs.values[mark.dataset.param];
       if (typeof value !== "number") continue;
       const now = mark.querySelector(":scope > .now") ?? addNumber(mark);
-      const text = short(value);
+      const text = shortNumber(value);
       if (now.localName === "span") now.textContent = `\u2009=\u2009${text}`;
       else now.textContent = value < 0 ? `(${text})` : text;
     }
   }
 }
 
-function markAt(event) {
+function symbolAt(event) {
   return event.target.closest?.("[data-param]") ?? null;
 }
 
 // A copy of a row, with names of its own for its parts.
-function copyOf(row) {
+function cloneRow(row) {
   const copy = row.cloneNode(true);
   copy.hidden = false;
   copy.classList.remove("set", "flash");

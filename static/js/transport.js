@@ -47,7 +47,7 @@ export class Transport {
     return this.send({ command: "speed", factor: bounded });
   }
 
-  faster(direction) {
+  changeSpeed(direction) {
     const now = this.status?.speed ?? 1;
     const next = direction > 0
       ? SPEEDS.find((speed) => speed > now * 1.001)

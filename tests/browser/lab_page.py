@@ -77,7 +77,7 @@ class LabPage:
         return self
 
     def wait_live(self) -> None:
-        expect(self.page.locator("#curtain.open")).to_be_attached()
+        expect(self.page.locator("#loading.done")).to_be_attached()
 
     @property
     def scene(self) -> FrameLocator:

@@ -96,7 +96,7 @@ def test_every_kind_of_plot_leaves_the_page(page: Page) -> None:
     check_menu(page, lab)
     svg = save(page, ALL, "svg")[1]
     said = words(ElementTree.fromstring(svg))
-    assert all(title in said for title in [*DRAWN, "Phase"]), "those on the shelf, too"
+    assert all(title in said for title in [*DRAWN, "Phase"]), "those behind tabs, too"
     png = save(page, ALL, "png")[1]
     keep("figures.png", png)
     check_picture(ElementTree.fromstring(svg), png)
@@ -129,7 +129,7 @@ def check_paper(page: Page, lab: LabPage) -> None:
     expect(figure).to_be_visible()
     expect(figure).to_contain_text("Position")
     expect(page.locator("#article h1")).to_be_visible()
-    for gone in ("#board", "#robot", "#transport", "#knobs", ".bar"):
+    for gone in ("#plot-board", "#robot", "#transport", "#knobs", ".bar"):
         expect(page.locator(gone)).to_be_hidden()
     page.evaluate("dispatchEvent(new Event('afterprint'))")
     expect(figure).to_have_count(0)

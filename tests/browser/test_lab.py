@@ -316,8 +316,8 @@ def test_every_kind_of_plot_draws(page: Page) -> None:
     expect(note).to_have_text([re.compile(r"on the (left|right)\.$"), "It swings."])
     screenshot(page, "plots")
     axis = """async () => {
-      const { power } = await import("/static/js/plots/ticks.js");
-      return [0.02, 1000, 2000, 1e-16, 5e-7, 2e4].map((value) => power(Math.log10(value)));
+      const { powerLabel } = await import("/static/js/plots/ticks.js");
+      return [0.02, 1000, 2000, 1e-16, 5e-7, 2e4].map((value) => powerLabel(Math.log10(value)));
     }"""
     assert page.evaluate(axis) == ["0.02", "1000", "2000", "10⁻¹⁶", "5·10⁻⁷", "2·10⁴"]
 

@@ -41,7 +41,7 @@ def test_knobs_robot_and_plots_are_in_view_together(page: Page, width: int, heig
         ("lqr", "", ("q_slide", "q_turn", "r")),
     ):
         lab = LabPage(page, scene=False).open(slug, query)
-        for part in ("#view", "#transport", "#tiles", "#plots > :not([hidden])", "#shelf"):
+        for part in ("#view", "#transport", "#tiles", "#plots > :not([hidden])", "#plot-tabs"):
             assert lab.whole(part), (slug, part)
         scene = page.locator("#view").bounding_box()
         assert scene
@@ -76,7 +76,7 @@ def test_what_the_reader_arranges_is_kept(page: Page) -> None:
     for name in ("article", "knobs"):  # however far they are moved, nothing is lost
         page.locator(f"[data-border={name}]").press("End")
     wait_frames(page)
-    for part in ("#view", "#transport", "#tiles", "#plots", "#shelf"):
+    for part in ("#view", "#transport", "#tiles", "#plots", "#plot-tabs"):
         assert lab.whole(part), part
     border.dblclick()
     wait_frames(page)
@@ -121,7 +121,7 @@ def test_on_a_phone_the_card_holds_its_knobs_and_its_plot(page: Page) -> None:
     overflow = "own => own.scrollWidth - own.clientWidth"
     assert own.evaluate(overflow) <= 0
     page.get_by_role("button", name="Plots").click()  # each sheet is whole, too
-    sheet_plot = page.locator("#board").get_by_role("region", name="Cost", exact=True)
+    sheet_plot = page.locator("#plot-board").get_by_role("region", name="Cost", exact=True)
     expect(sheet_plot).to_be_visible()
     page.get_by_role("button", name="Knobs").click()
     expect(page.locator("#knobs .knob.set")).to_have_count(2)
@@ -225,7 +225,7 @@ def test_nothing_jumps_while_the_lab_starts(page: Page) -> None:
             for (const e of list.getEntries()) window.shift += e.value;
         }).observe({type: 'layout-shift', buffered: true}); }"""
     )
-    expect(page.locator("#curtain.open")).to_be_attached()
+    expect(page.locator("#loading.done")).to_be_attached()
     page.wait_for_load_state("networkidle")  # all has come: scene, curves, fonts
     wait_frames(page)
     assert page.evaluate("window.shift") < 0.02

@@ -6,17 +6,17 @@ const SPACE = 14; // [px] between entries
 const MATH = "'Times New Roman', Times, serif"; // not the page's: a picture has none but the system's
 
 // A piece of an entry in words; those of a formula are {text, italic, level}.
-export function words(text) {
+export function textPiece(text) {
   return { text, plain: true };
 }
 
-export function entry(pieces, swatch = null, tone = "") {
+export function legendEntry(pieces, swatch = null, tone = "") {
   return { pieces, swatch, tone };
 }
 
 // Draws the entries from a place on, the first line after an indent; `right` sets them flush right.
 // Tells how high they are.
-export function flow(root, entries, [x, y], width, { size, indent = 0, right = false }) {
+export function layoutEntries(root, entries, [x, y], width, { size, indent = 0, right = false }) {
   const line = Math.round(1.5 * size);
   const made = entries.map((one) => draw(root, one, size));
   let row = [];

@@ -1,11 +1,11 @@
 // One bar a component, the limit each must stay within, and marks to compare with.
 
-import { number } from "../format.js";
+import { formatNumber } from "../format.js";
 import { card } from "./card.js";
 import { Chart } from "./chart.js";
-import { sentences } from "./summary.js";
+import { joinSentences } from "./summary.js";
 import { symbol } from "./symbol.js";
-import { around } from "./ticks.js";
+import { paddedRange } from "./ticks.js";
 
 export class Bars {
   constructor(plot) {
@@ -31,7 +31,7 @@ export class Bars {
   paint(chart) {
     if (!this.values) return;
     const n = this.values.length;
-    const wanted = around([...this.values, ...this.limits, ...this.limits.map((v) => -v), ...this.marks], { zero: true });
+    const wanted = paddedRange([...this.values, ...this.limits, ...this.limits.map((v) => -v), ...this.marks], { zero: true });
     const fits = this.y && this.y[0] <= wanted[0] && this.y[1] >= wanted[1];
     if (!fits || this.y[1] - this.y[0] > 3 * (wanted[1] - wanted[0])) this.y = wanted;
     chart.begin([0.4, n + 0.6], this.y, { xTicks: n > 30 ? null : this.values.map((_, i) => i + 1), xNames: this.names });
@@ -52,8 +52,8 @@ export class Bars {
 
   summary() {
     if (!this.values) return "";
-    const parts = this.values.map((value, i) => `${this.names?.[i] ?? i + 1}: ${number(value, 3)}`);
-    return sentences(`${this.plot.title}, bars${this.plot.unit ? ` in ${this.plot.unit}` : ""}`, parts);
+    const parts = this.values.map((value, i) => `${this.names?.[i] ?? i + 1}: ${formatNumber(value, 3)}`);
+    return joinSentences(`${this.plot.title}, bars${this.plot.unit ? ` in ${this.plot.unit}` : ""}`, parts);
   }
 
   clear() {

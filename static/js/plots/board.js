@@ -1,18 +1,18 @@
 // All plots of a lab: keeps the samples of this run and the one before, and what they have in
 // common, the stretch of time shown and the component chosen.
 
-import { History } from "../history.js";
+import { SampleBuffer } from "../sample_buffer.js";
 import { Bars } from "./bars.js";
 import { element } from "./card.js";
 import { Curves } from "./curves.js";
 import { HeatMap } from "./heatmap.js";
-import { isShown } from "./labels.js";
 import { Matrix } from "./matrix.js";
 import { Note } from "./note.js";
-import { forgetColours } from "./palette.js";
-import { NumbersRow } from "./numbers.js";
+import { clearColourCache } from "./palette.js";
+import { isShown } from "./placeholders.js";
+import { PlotTabs } from "./plot_tabs.js";
+import { ReadoutRow } from "./readout_row.js";
 import { Readouts } from "./readouts.js";
-import { Shelf } from "./shelf.js";
 import { summarise } from "./summary.js";
 import { TimeSeries } from "./timeseries.js";
 
@@ -20,7 +20,7 @@ const WORDS_EVERY = 2000; // [ms]
 const LONGEST_WAIT = 50; // [ms] for what a change has done
 const KINDS = { TimeSeries, Curves, Bars, Matrix, HeatMap, Note };
 
-export class Board {
+export class PlotBoard {
   // `isFresh` tells whether what was received shows the last change already.
   constructor(lab, isFresh) {
     this.lab = lab;
@@ -36,13 +36,13 @@ export class Board {
     this.labels = {}; // what the lab says under its present parameters
     this.said = "{}";
     this.readouts = new Readouts(lab.plots.filter((p) => p.kind === "Readout"), document.getElementById("tiles"));
-    new NumbersRow();
+    new ReadoutRow();
     this.plots = lab.plots.filter((p) => p.kind in KINDS).map((p) => new KINDS[p.kind](p, this));
     document.getElementById("plots").append(...this.plots.map((plot) => plot.section));
-    this.shelf = new Shelf(lab.slug, this.plots, () => this.rearranged());
+    this.plotTabs = new PlotTabs(lab.slug, this.plots, () => this.rearranged());
     this.series = this.plots.filter((plot) => plot instanceof TimeSeries);
-    this.pictured = this.plots.filter((plot) => plot.update);
-    setInterval(() => summarise(this.shelf.shown), WORDS_EVERY);
+    this.fieldPlots = this.plots.filter((plot) => plot.update);
+    setInterval(() => summarise(this.plotTabs.shown), WORDS_EVERY);
     this.unzoomButton = document.getElementById("unzoom");
     this.unzoomButton?.addEventListener("click", () => this.unzoom());
     const select = (this.windowMenu = document.getElementById("window"));
@@ -53,7 +53,7 @@ export class Board {
   hello({ columns }) {
     const same = this.run && columns.join() === this.run.columns.join();
     if (same) return;
-    this.run = new History(columns);
+    this.run = new SampleBuffer(columns);
     this.ghost = null;
     this.writeSelectors();
     for (const plot of this.series) plot.rebuild();
@@ -68,7 +68,7 @@ export class Board {
       if (!this.run.length || row[0] > this.run.last) this.run.push(row);
     }
     if (fields) this.relabel(fields);
-    if (fields) for (const plot of this.pictured) plot.update(fields);
+    if (fields) for (const plot of this.fieldPlots) plot.update(fields);
     if (rows.length || now) this.refresh();
   }
 
@@ -91,7 +91,7 @@ export class Board {
     if (key === this.params) return;
     this.params = key;
     this.readouts.choose(params);
-    this.shelf.choose(this.plots.filter(({ plot }) => isShown(plot, params)));
+    this.plotTabs.choose(this.plots.filter(({ plot }) => isShown(plot, params)));
   }
 
   // Another run: what was drawn so far turns into the faint trace.
@@ -99,13 +99,13 @@ export class Board {
     this.number = number;
     if (this.run.length > 1) this.ghost = this.run;
     if (this.compared?.run === number) this.ghost = this.compared.history;
-    this.run = new History(this.run.columns);
+    this.run = new SampleBuffer(this.run.columns);
     this.zoomed = null;
   }
 
   // A run was made to compare with: it is the faint trace.
   compare({ run, columns, rows }) {
-    const history = new History(columns);
+    const history = new SampleBuffer(columns);
     for (const row of rows) history.push(row);
     this.compared = { run, history };
     if (run === this.number) this.ghost = history;
@@ -114,10 +114,10 @@ export class Board {
 
   clear() {
     if (!this.run) return;
-    this.run = new History(this.run.columns);
+    this.run = new SampleBuffer(this.run.columns);
     this.ghost = null;
     for (const plot of this.series) plot.span = null;
-    for (const plot of this.pictured) plot.clear();
+    for (const plot of this.fieldPlots) plot.clear();
     this.unzoom();
   }
 
@@ -170,7 +170,7 @@ export class Board {
   }
 
   retheme() {
-    forgetColours();
+    clearColourCache();
     for (const plot of this.plots) plot.rebuild?.();
   }
 
@@ -178,7 +178,7 @@ export class Board {
   watch(titles, label) {
     const wanted = titles.map((title) => this.find(title));
     for (const plot of this.plots) plot.section.classList.toggle("watched", wanted.includes(plot));
-    this.shelf.watch(wanted);
+    this.plotTabs.watch(wanted);
     this.readouts.mark(label);
   }
 

@@ -2,8 +2,8 @@
 // that leaves the page. Its colours come from the style sheet, so that a change of theme needs no
 // redrawing.
 
-import { fitted, widthOf } from "../figures/words.js";
-import { about, decades, label, power, ticks } from "./ticks.js";
+import { fitLabel, textWidth } from "../figures/text_layout.js";
+import { centredRange, logTicks, powerLabel, tickLabel, ticks } from "./ticks.js";
 
 let clips = 0;
 const SVG = "http://www.w3.org/2000/svg";
@@ -41,17 +41,17 @@ export class Chart {
     const slanted = longest * 0.56 * em > (width - 4 * em) / (xTicks?.length || 1);
     const bottom = (slanted ? 1.4 + 0.34 * longest : 2) * em + (xLabel ? 1.4 * em : 0);
     const tall = Math.max(1, height - bottom - 0.7 * em);
-    const yTicks = (from, to) => (logY ? decades : ticks)(from, to, tall / (3 * em), least);
-    const yText = logY ? power : label;
+    const yTicks = (from, to) => (logY ? logTicks : ticks)(from, to, tall / (3 * em), least);
+    const yText = logY ? powerLabel : tickLabel;
     // As wide as the longest number, so that none is cut off: digits are 0.56 em wide or less.
     const digits = Math.max(...yTicks(y0, y1).map((v) => yText(v).length), 3);
-    const upright = yLabel ? fitted(yLabel, (height * 12) / em) : [];
+    const upright = yLabel ? fitLabel(yLabel, (height * 12) / em) : [];
     const left = (0.9 + 0.56 * Math.min(digits, 12) + (upright.length ? 0.4 + 1.2 * upright.length : 0)) * em;
     this.area = { left, top: 0.7 * em, width: Math.max(1, width - left - (1 + right) * em), height: tall };
     if (square) {
       const perPixel = Math.max((x1 - x0) / this.area.width, (y1 - y0) / this.area.height);
-      [x0, x1] = about((x0 + x1) / 2, perPixel * this.area.width);
-      [y0, y1] = about((y0 + y1) / 2, perPixel * this.area.height);
+      [x0, x1] = centredRange((x0 + x1) / 2, perPixel * this.area.width);
+      [y0, y1] = centredRange((y0 + y1) / 2, perPixel * this.area.height);
     }
     this.ranges = downward ? [x0, x1, y1, y0] : [x0, x1, y0, y1];
     const { top } = this.area;
@@ -62,13 +62,13 @@ export class Chart {
     // Numbers of bars that would touch are told in steps.
     const numbers = xNames ? 0 : (xTicks ?? []).length;
     const every = Math.max(1, Math.ceil((numbers * (0.56 * String(numbers).length + 0.4) * em) / this.area.width));
-    for (const v of xTicks ?? (logX ? decades : ticks)(x0, x1, this.area.width / (6 * em), least)) {
+    for (const v of xTicks ?? (logX ? logTicks : ticks)(x0, x1, this.area.width / (6 * em), least)) {
       if ((v - 1) % every && numbers) continue;
       if (grid && !xTicks) this.line([v, y0], [v, y1], v === 0 && !logX ? "zero" : "grid");
-      const text = xNames?.[v - 1] ?? (logX ? power : label)(v);
+      const text = xNames?.[v - 1] ?? (logX ? powerLabel : tickLabel)(v);
       const shown = text.length > 12 ? `${text.slice(0, 11)}…` : text;
       // A long number at the very end is moved until it is whole.
-      const x = slanted ? this.x(v) : Math.min(this.x(v), width - (widthOf(shown) * em) / 24);
+      const x = slanted ? this.x(v) : Math.min(this.x(v), width - (textWidth(shown) * em) / 24);
       const y = top + this.area.height + (slanted ? 1 : 1.5) * em;
       const made = this.text(x, y, shown, slanted ? "end" : "middle");
       if (slanted) made.setAttribute("transform", `rotate(-35 ${x} ${y})`);
@@ -82,7 +82,7 @@ export class Chart {
   upright(lines, x) {
     const { top, height } = this.area;
     for (const [i, text] of lines.entries()) {
-      const half = (widthOf(text) * this.em) / 24;
+      const half = (textWidth(text) * this.em) / 24;
       const y = Math.max(half, Math.min(top + height / 2, this.body.clientHeight - half));
       const foot = x + 1.2 * i * this.em;
       this.text(foot, y, text, "middle").setAttribute("transform", `rotate(-90 ${foot} ${y})`);

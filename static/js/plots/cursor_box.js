@@ -1,7 +1,7 @@
 // The box beside a time series' cursor: the time, and in the plot one points at all its curves'
 // values there.
 
-import { number } from "../format.js";
+import { formatNumber } from "../format.js";
 import { element } from "./card.js";
 import { colour } from "./palette.js";
 import { symbol } from "./symbol.js";
@@ -32,7 +32,7 @@ export class CursorBox {
         entry.style.color = colour(curve.tone);
         entry.style.gridColumn = curve.l + 1;
         entry.append(symbol(curve.line.mathml, curve.c));
-        entry.append(element("output", "", number(u.data[plot.curves.indexOf(curve) + 1][at], 3)));
+        entry.append(element("output", "", formatNumber(u.data[plot.curves.indexOf(curve) + 1][at], 3)));
         box.append(entry);
       }
     }

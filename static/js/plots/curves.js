@@ -1,13 +1,13 @@
 // Lines and sets of points in one chart, each of which the legend can switch off; axes may be
 // logarithmic.
 
-import { number } from "../format.js";
+import { formatNumber } from "../format.js";
 import { card, element } from "./card.js";
 import { Chart } from "./chart.js";
-import { fill } from "./labels.js";
-import { outline, placesAlong, swatch } from "./marks.js";
-import { extent, sentences } from "./summary.js";
-import { around } from "./ticks.js";
+import { markPath, markPositions, swatch } from "./marks.js";
+import { fillPlaceholders } from "./placeholders.js";
+import { describeRange, joinSentences } from "./summary.js";
+import { paddedRange } from "./ticks.js";
 
 const SERIES = 8;
 
@@ -21,8 +21,8 @@ export class Curves {
   }
 
   update(fields) {
-    this.xLabel = fill(this.plot.x_label, fields);
-    this.yLabel = fill(this.plot.y_label, fields);
+    this.xLabel = fillPlaceholders(this.plot.x_label, fields);
+    this.yLabel = fillPlaceholders(this.plot.y_label, fields);
     // A logarithm has no place for what is negative: the axis is then linear.
     const negative = ({ y }) => (fields[y] ?? []).flat().some((v) => v < 0);
     const traces = this.plot.traces.filter(({ optional, y }) => !optional || y in fields);
@@ -45,7 +45,7 @@ export class Curves {
     return Array.from({ length: count }, (_, k) => ({
       style: trace.style,
       series: trace.series ? ((trace.series - 1 + k) % SERIES) + 1 : 0,
-      label: labels ? labels[k] : fill(trace.label, fields, k),
+      label: labels ? labels[k] : fillPlaceholders(trace.label, fields, k),
       note: trace.note ? (fields[trace.note] ?? [])[k] : undefined,
       points: xs
         .map((v, i) => [place(Array.isArray(v) ? v[k] : v, logX), place(several ? ys[i][k] : ys[i], logY)])
@@ -65,7 +65,7 @@ export class Curves {
       const button = this.entries.get(label);
       button.classList.toggle("nothing", points.length === 0);
       const text = button.querySelector(".note");
-      if (text) text.textContent = Number.isFinite(note) ? number(note) : "";
+      if (text) text.textContent = Number.isFinite(note) ? formatNumber(note) : "";
     }
   }
 
@@ -103,11 +103,11 @@ export class Curves {
     const circle = guide === "unit-circle";
     const axis = guide === "imaginary-axis" || guide === "left-half-plane";
     const extra = circle ? [-1, 1] : [];
-    const x = around([...shown.flatMap(({ points }) => points.map(([a]) => a)), ...extra, ...(axis ? [0] : [])]);
-    const y = around([...shown.flatMap(({ points }) => points.map(([, b]) => b)), ...extra]);
+    const x = paddedRange([...shown.flatMap(({ points }) => points.map(([a]) => a)), ...extra, ...(axis ? [0] : [])]);
+    const y = paddedRange([...shown.flatMap(({ points }) => points.map(([, b]) => b)), ...extra]);
     // Beside a guide the frame stands still while points wander within it.
-    this.x = guide === "none" ? x : widened(this.x, x);
-    this.y = guide === "none" ? y : widened(this.y, y);
+    this.x = guide === "none" ? x : keepRange(this.x, x);
+    this.y = guide === "none" ? y : keepRange(this.y, y);
     chart.begin(this.x, this.y, { square: equal || circle, xLabel, yLabel, logX, logY });
     const [x0, , y0, y1] = chart.ranges;
     if (guide === "left-half-plane") {
@@ -129,9 +129,9 @@ export class Curves {
     const own = style === "points" || style === "marked";
     if (!own && !(this.marked && series)) return;
     const size = style === "points" ? 1.2 : style === "marked" ? 0.8 : 1;
-    for (const [x, y] of own ? places : placesAlong(places, series)) {
+    for (const [x, y] of own ? places : markPositions(places, series)) {
       const at = `translate(${x.toFixed(1)} ${y.toFixed(1)}) scale(${size})`;
-      chart.add("path", { d: outline(series), transform: at, class: "point tone", style: colour });
+      chart.add("path", { d: markPath(series), transform: at, class: "point tone", style: colour });
     }
   }
 
@@ -140,8 +140,8 @@ export class Curves {
     const value = (v) => (this.logY ? 10 ** v : v);
     const there = this.curves.filter(({ points }) => points.length);
     const parts = there.map(({ label, points }) =>
-      `${label || "points"}: ${points.length} points, ${extent(points.map(([, y]) => value(y)))}`);
-    return sentences(`${this.plot.title}: ${this.yLabel || "values"} over ${this.xLabel}`, parts);
+      `${label || "points"}: ${points.length} points, ${describeRange(points.map(([, y]) => value(y)))}`);
+    return joinSentences(`${this.plot.title}: ${this.yLabel || "values"} over ${this.xLabel}`, parts);
   }
 
   clear() {
@@ -154,7 +154,7 @@ function tone(series) {
 }
 
 // The old range while it fits and is not much too wide, else the wanted one.
-function widened(old, wanted) {
+function keepRange(old, wanted) {
   const fits = old && old[0] <= wanted[0] && old[1] >= wanted[1];
   return fits && old[1] - old[0] < 3 * (wanted[1] - wanted[0]) ? old : wanted;
 }

@@ -1,14 +1,14 @@
 // A field over a plane in colours, with a scale beside it and arrows over it. Its cells are drawn on
 // a canvas beneath the chart; in a figure each is a rectangle.
 
-import { fitted } from "../figures/words.js";
-import { number } from "../format.js";
+import { fitLabel } from "../figures/text_layout.js";
+import { formatNumber } from "../format.js";
 import { paintArrows } from "./arrows.js";
 import { card, element } from "./card.js";
 import { Chart, em } from "./chart.js";
-import { fill } from "./labels.js";
-import { extent, sentences } from "./summary.js";
-import { around, bounds, label, ticks } from "./ticks.js";
+import { fillPlaceholders } from "./placeholders.js";
+import { describeRange, joinSentences } from "./summary.js";
+import { finiteRange, paddedRange, tickLabel, ticks } from "./ticks.js";
 
 // The colours of values in the scene too (labs/colors.py), from the least to the largest.
 const SEQUENTIAL = ["#2b2459", "#363d7d", "#3d589e", "#3477a0", "#35949d", "#56ad8f", "#82c381", "#bcd67c", "#f2e873"];
@@ -30,7 +30,7 @@ export class HeatMap {
     const { x, y, z, arrows } = this.plot;
     if (![x, y, z].every((name) => fields[name])) return; // those of another plot, while this one is hidden
     this.data = { x: fields[x], y: fields[y], z: fields[z], arrows: fields[arrows] ?? [] };
-    this.labels = [this.plot.x_label, this.plot.y_label, this.plot.z_label].map((text) => fill(text, fields));
+    this.labels = [this.plot.x_label, this.plot.y_label, this.plot.z_label].map((text) => fillPlaceholders(text, fields));
     this.draw();
   }
 
@@ -57,9 +57,9 @@ export class HeatMap {
     const [xLabel, yLabel, zLabel] = this.labels;
     const whole = [...x, ...y].every(Number.isInteger);
     const scale = ticks(...range, chart.body.clientHeight / 48);
-    const zLines = zLabel ? fitted(zLabel, (chart.body.clientHeight * 12) / em()) : [];
-    const right = 2.2 + 0.56 * Math.max(...scale.map((v) => label(v).length), 2) + (zLines.length ? 0.4 + 1.2 * zLines.length : 0);
-    chart.begin(bounds(xEdges), bounds(yEdges), { xLabel, yLabel, downward: this.plot.downward, whole, right, grid: false });
+    const zLines = zLabel ? fitLabel(zLabel, (chart.body.clientHeight * 12) / em()) : [];
+    const right = 2.2 + 0.56 * Math.max(...scale.map((v) => tickLabel(v).length), 2) + (zLines.length ? 0.4 + 1.2 * zLines.length : 0);
+    chart.begin(finiteRange(xEdges), finiteRange(yEdges), { xLabel, yLabel, downward: this.plot.downward, whole, right, grid: false });
     z.forEach((row, i) => {
       const [top, bottom] = [chart.y(yEdges[i]), chart.y(yEdges[i + 1])].sort((a, b) => a - b);
       const tones = row.map((value) => tone(value, range));
@@ -69,14 +69,14 @@ export class HeatMap {
         if (tones[j]) cell({ x: left, y: top, width: end - left, height: bottom - top, fill: tones[j] });
       }
     });
-    paintScale(chart, range, scale, zLines);
+    paintColourBar(chart, range, scale, zLines);
     paintArrows(chart, arrows);
   }
 
   // Of the values there are; a constant stands in its middle.
   range(z) {
-    const [low, high] = bounds(z.flat());
-    return high > low ? [low, high] : around([low]);
+    const [low, high] = finiteRange(z.flat());
+    return high > low ? [low, high] : paddedRange([low]);
   }
 
   // The value under the pointer.
@@ -90,7 +90,7 @@ export class HeatMap {
     const { x, y, z } = this.data;
     const [x0, x1, y0, y1] = this.chart.ranges;
     const [j, i] = [nearest(x, x0 + (across / width) * (x1 - x0)), nearest(y, y1 + (down / height) * (y0 - y1))];
-    const words = [`${this.labels[0]}: ${number(x[j], 4)}`, `${this.labels[1]}: ${number(y[i], 4)}`, `${this.labels[2]}: ${number(z[i][j], 4)}`];
+    const words = [`${this.labels[0]}: ${formatNumber(x[j], 4)}`, `${this.labels[1]}: ${formatNumber(y[i], 4)}`, `${this.labels[2]}: ${formatNumber(z[i][j], 4)}`];
     this.box.replaceChildren(...words.map((text) => element("span", "", text)));
     this.box.style.insetInline = across > width / 2 ? `${left + 4}px auto` : `auto ${at.width - left - width + 4}px`;
   }
@@ -99,16 +99,16 @@ export class HeatMap {
     if (!this.data) return "";
     const [xLabel, yLabel, zLabel] = this.labels;
     const { x, y, z, arrows } = this.data;
-    const parts = [`${zLabel} ${extent(z.flat()).replace(/, last.*/, "")}`, `${x.length} columns and ${y.length} rows`];
+    const parts = [`${zLabel} ${describeRange(z.flat()).replace(/, last.*/, "")}`, `${x.length} columns and ${y.length} rows`];
     if (this.plot.arrows) parts.push(`${arrows.length} arrows`);
-    return sentences(`${this.plot.title}: a map over ${xLabel} and ${yLabel}`, parts);
+    return joinSentences(`${this.plot.title}: a map over ${xLabel} and ${yLabel}`, parts);
   }
 
   clear() {}
 }
 
 // The scale of colours, right of the area.
-function paintScale(chart, [low, high], scale, lines) {
+function paintColourBar(chart, [low, high], scale, lines) {
   const { left, top, width, height } = chart.area;
   const { em } = chart;
   const bar = { x: left + width + 0.8 * em, width: 0.8 * em };
@@ -119,7 +119,7 @@ function paintScale(chart, [low, high], scale, lines) {
     const fill = STEPS[Math.round((1 - (k + 0.5) / count) * (STEPS.length - 1))];
     chart.add("rect", { ...bar, y, height: height / count + (k < count - 1 ? 0.5 : 0), fill });
   }
-  for (const v of scale) chart.text(bar.x + bar.width + 0.35 * em, place(v) + 0.35 * em, label(v), "start");
+  for (const v of scale) chart.text(bar.x + bar.width + 0.35 * em, place(v) + 0.35 * em, tickLabel(v), "start");
   chart.upright(lines, chart.body.clientWidth - (1.2 * lines.length - 0.6) * em);
 }
 

@@ -1,12 +1,12 @@
 // The legend of a time series: one entry a line with its value, or, of many components, lines and
 // colours apart. Its entries show and hide their curves.
 
-import { spoken } from "../figures/words.js";
-import { number } from "../format.js";
+import { speechText } from "../figures/text_layout.js";
+import { formatNumber } from "../format.js";
 import { element } from "./card.js";
-import { fill } from "./labels.js";
 import { swatch } from "./marks.js";
 import { SERIES } from "./palette.js";
+import { fillPlaceholders } from "./placeholders.js";
 import { symbol } from "./symbol.js";
 
 export class Legend {
@@ -37,7 +37,7 @@ export class Legend {
       const mark = plot.marked && !several && style !== "area" ? series : 0;
       const button = this.entry(`l${l}`, style, several && style !== "limit" ? "axis" : tone, mark);
       const math = button.appendChild(symbol(line.mathml, several ? null : c));
-      button.setAttribute("aria-label", spoken(math));
+      button.setAttribute("aria-label", speechText(math));
       if (!several) this.values.push([l, button.appendChild(element("output", "", "—"))]);
     }
     const { labels } = plot.board;
@@ -47,7 +47,7 @@ export class Legend {
       const name = labels[plot.plot.select]?.[c] ?? String(c + 1);
       button.append(name);
       button.setAttribute("aria-label", `${plot.plot.select} ${name}`.trim());
-      if (!plot.unit && plot.plot.unit) button.append(element("small", "", fill(plot.plot.unit, labels, c)));
+      if (!plot.unit && plot.plot.unit) button.append(element("small", "", fillPlaceholders(plot.plot.unit, labels, c)));
     }
   }
 
@@ -70,7 +70,7 @@ export class Legend {
   showValues({ data }, at) {
     for (const [l, output] of this.values) {
       const samples = data[this.plot.curves.findIndex((curve) => curve.l === l) + 1];
-      const text = number(samples[at ?? samples.length - 1]);
+      const text = formatNumber(samples[at ?? samples.length - 1]);
       if (output.textContent !== text) output.textContent = text;
     }
   }

@@ -19,7 +19,7 @@ const paths = SHAPES.map((shape) => new Path2D(shape));
 export const DASHES = { dash: [7, 5], limit: [3, 4] };
 
 // The outline of a series' mark, about the origin; of series 0, ink, a disc.
-export function outline(series) {
+export function markPath(series) {
   return SHAPES[Math.max(0, series - 1)];
 }
 
@@ -41,13 +41,13 @@ export function swatch(style, tone, series = 0) {
   made.style.setProperty("--tone", tone);
   if (style === "area") made.append(svg("rect", { x: -9, y: -4, width: 18, height: 8, rx: 1.5 }));
   else if (style !== "points") made.append(svg("line", { x1: -10, x2: 10, y1: 0, y2: 0, class: style }));
-  if (series || style === "points") made.append(svg("path", { d: outline(series) }));
+  if (series || style === "points") made.append(svg("path", { d: markPath(series) }));
   return made;
 }
 
 // Where the marks of a polyline of places [x, y] go: every so many pixels along it, counted
 // along x above all, a little later for each series, so that marks do not lie on one another.
-export function placesAlong(places, series, every = 90) {
+export function markPositions(places, series, every = 90) {
   const found = [];
   let next = every * (0.25 + series / 11);
   let gone = 0;

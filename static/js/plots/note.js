@@ -1,6 +1,6 @@
 // What a lab says of its world, in sentences.
 
-import { wrapped } from "../figures/words.js";
+import { wrapText } from "../figures/text_layout.js";
 import { card, element } from "./card.js";
 import { em } from "./chart.js";
 
@@ -20,7 +20,7 @@ export class Note {
 
   // In lines of a figure as wide as this [px].
   lines(width) {
-    return wrapped(this.text ?? "", width - 2 * em());
+    return wrapText(this.text ?? "", width - 2 * em());
   }
 
   paint(chart) {

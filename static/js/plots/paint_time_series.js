@@ -1,10 +1,10 @@
 // A time series as vectors, for figures: what uPlot, and what is drawn beneath and above it, show on
 // the page.
 
-import { areas, ghostSamples } from "./beneath.js";
 import { guessedLines } from "./guess.js";
-import { outline, placesAlong } from "./marks.js";
-import { bounds } from "./ticks.js";
+import { markPath, markPositions } from "./marks.js";
+import { finiteRange } from "./ticks.js";
+import { ghostSamples, stackedAreas } from "./underlays.js";
 
 export function paintTimeSeries(plot, chart) {
   const [from, to] = plot.board.range();
@@ -12,21 +12,21 @@ export function paintTimeSeries(plot, chart) {
   const [t, ...all] = data;
   chart.begin([from, to], verticalRange(plot, data), { xLabel: "time [s]" });
   chart.clipped(() => {
-    for (const { curve, from: low, to: high } of areas(plot, data)) {
+    for (const { curve, from: low, to: high } of stackedAreas(plot, data)) {
       const outlined = [...points(t, high), ...points(t, low).reverse()];
       chart.add("polygon", { points: path(chart, outlined), class: "area tone", style: tone(curve) });
     }
     for (const { curve, x, y } of ghostSamples(plot, from, to)) {
-      for (const piece of pieces(x, y)) polyline(chart, piece, "curve tone ghost", tone(curve));
+      for (const piece of splitAtGaps(x, y)) polyline(chart, piece, "curve tone ghost", tone(curve));
     }
     plot.curves.forEach((curve, i) => {
       if (!plot.shows(curve) || plot.isArea(curve.line)) return;
-      const whole = pieces(t, all[i]);
+      const whole = splitAtGaps(t, all[i]);
       for (const piece of whole) polyline(chart, piece, `curve tone ${curve.line.style}`, tone(curve));
       if (!plot.marked || !curve.series) return;
       const places = whole.flat().map(([a, b]) => [chart.x(a), chart.y(b)]);
-      for (const [x, y] of placesAlong(places, curve.series)) {
-        chart.add("path", { d: outline(curve.series), transform: `translate(${x.toFixed(1)} ${y.toFixed(1)})`, class: "point tone", style: tone(curve) });
+      for (const [x, y] of markPositions(places, curve.series)) {
+        chart.add("path", { d: markPath(curve.series), transform: `translate(${x.toFixed(1)} ${y.toFixed(1)})`, class: "point tone", style: tone(curve) });
       }
     });
     if (plot.guess) paintGuess(chart, guessedLines(plot.guess, from, to));
@@ -40,7 +40,7 @@ function verticalRange(plot, data) {
   let ends = [Infinity, -Infinity];
   plot.curves.forEach((curve, i) => {
     if (!plot.shows(curve) || curve.line.style === "limit" || plot.isArea(curve.line)) return;
-    ends = bounds(data[i + 1], ends);
+    ends = finiteRange(data[i + 1], ends);
   });
   return plot.range(...ends, data);
 }
@@ -53,7 +53,7 @@ function paintGuess(chart, lines) {
 }
 
 // The stretches of a curve without gaps, as lists of [t, value].
-function pieces(t, values) {
+function splitAtGaps(t, values) {
   const found = [[]];
   points(t, values).forEach((point) => (Number.isFinite(point[1]) ? found.at(-1).push(point) : found.push([])));
   return found.filter(({ length }) => length > 1);

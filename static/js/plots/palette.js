@@ -23,6 +23,6 @@ export function diverging(level) {
   return `color-mix(in srgb, var(--${level < 0 ? "negative" : "positive"}) ${share}%, transparent)`;
 }
 
-export function forgetColours() {
+export function clearColourCache() {
   cache = new Map();
 }

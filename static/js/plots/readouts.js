@@ -1,8 +1,8 @@
 // Scalars as a row of tiles; a dash where a number is not defined (yet).
 
-import { number } from "../format.js";
+import { formatNumber } from "../format.js";
 import { element } from "./card.js";
-import { fill, isShown } from "./labels.js";
+import { fillPlaceholders, isShown } from "./placeholders.js";
 
 export class Readouts {
   constructor(plots, host) {
@@ -24,10 +24,10 @@ export class Readouts {
   // The names and units as the parameters have them.
   relabel(labels) {
     for (const { plot, name, output, small } of this.tiles) {
-      const label = fill(plot.label, labels);
+      const label = fillPlaceholders(plot.label, labels);
       name.textContent = name.title = label;
       output.setAttribute("aria-label", label);
-      small.textContent = fill(plot.unit, labels);
+      small.textContent = fillPlaceholders(plot.unit, labels);
     }
   }
 
@@ -44,7 +44,7 @@ export class Readouts {
   update(run, now) {
     for (const { plot: { channel, whole }, output } of this.tiles) {
       const value = now ? now[run.columns.indexOf(channel)] : run.latest(channel);
-      const text = whole && Number.isInteger(value) ? String(value) : number(value, 3);
+      const text = whole && Number.isInteger(value) ? String(value) : formatNumber(value, 3);
       if (output.textContent !== text) output.textContent = text;
     }
   }

@@ -11,39 +11,39 @@ export function symbol(mathml, component = null) {
   if (equals > 0) parts.splice(equals).forEach((part) => part.remove());
   const sign = parts[0].localName === "mo" && /^[-−+]$/.test(parts[0].textContent) ? parts[0] : null;
   sign?.remove();
-  index(math, component);
+  addSubscript(math, component);
   if (sign) math.prepend(sign);
   return math;
 }
 
-function index(math, component) {
-  const number = make("mn", String(component + 1));
+function addSubscript(math, component) {
+  const number = mathElement("mn", String(component + 1));
   const only = math.childElementCount === 1 ? math.firstElementChild : null;
   const kind = only?.localName;
   if (kind === "msub" || kind === "msubsup") {
     const old = only.children[1];
-    const both = make("mrow");
+    const both = mathElement("mrow");
     old.replaceWith(both);
-    both.append(old, make("mo", ","), number);
+    both.append(old, mathElement("mo", ","), number);
   } else if (kind === "msup") {
-    const joined = make("msubsup");
+    const joined = mathElement("msubsup");
     const [base, above] = only.children;
     joined.append(base, number, above);
     only.replaceWith(joined);
   } else {
-    const base = make("mrow");
+    const base = mathElement("mrow");
     base.append(...math.childNodes);
     if (!only) {
-      base.prepend(make("mo", "("));
-      base.append(make("mo", ")"));
+      base.prepend(mathElement("mo", "("));
+      base.append(mathElement("mo", ")"));
     }
-    const indexed = make("msub");
+    const indexed = mathElement("msub");
     indexed.append(base, number);
     math.append(indexed);
   }
 }
 
-function make(name, text = "") {
+function mathElement(name, text = "") {
   const element = document.createElementNS(MATHML, name);
   element.textContent = text;
   return element;

@@ -1,9 +1,9 @@
 // Ranges of axes, and the round numbers on them.
 
-import { raised } from "../format.js";
+import { superscript } from "../format.js";
 
 // The least and the largest of finite values and of those before; without any Infinity, -Infinity.
-export function bounds(values, [low, high] = [Infinity, -Infinity]) {
+export function finiteRange(values, [low, high] = [Infinity, -Infinity]) {
   for (const value of values) {
     if (!Number.isFinite(value)) continue;
     if (value < low) low = value;
@@ -13,8 +13,8 @@ export function bounds(values, [low, high] = [Infinity, -Infinity]) {
 }
 
 // The range of finite values, a little wider, and never empty.
-export function around(values, { zero = false } = {}) {
-  let [low, high] = bounds(values, zero ? [0, 0] : undefined);
+export function paddedRange(values, { zero = false } = {}) {
+  let [low, high] = finiteRange(values, zero ? [0, 0] : undefined);
   if (low > high) [low, high] = [0, 0];
   // A constant does not fill the frame with its rounding.
   const size = Math.max(Math.abs(low), Math.abs(high));
@@ -25,7 +25,7 @@ export function around(values, { zero = false } = {}) {
 }
 
 // The range of this width about a middle.
-export function about(middle, width) {
+export function centredRange(middle, width) {
   return [middle - width / 2, middle + width / 2];
 }
 
@@ -48,18 +48,18 @@ function multiples(low, high, step) {
 
 // Ticks of a logarithmic axis: whole decades, or 1, 2 and 5 of each, or 1 and 3, where there are few
 // decades and the numbers do not touch. Two at least, however close: a number alone shows no scale.
-export function decades(low, high, most) {
+export function logTicks(low, high, most) {
   const stride = Math.max(1, Math.ceil((high - low) / Math.max(1, most)));
   const room = (fewest) => high - low <= 2 && Math.log10(fewest) * most > 0.48 * (high - low);
-  const found = parts(low, high, room(2) ? [1, 2, 5] : room(3) ? [1, 3] : [1], stride);
+  const found = decadeTicks(low, high, room(2) ? [1, 2, 5] : room(3) ? [1, 3] : [1], stride);
   if (found.length > 1) return found;
-  const closer = [[1], [1, 3], [1, 2, 5]].map((steps) => parts(low, high, steps));
+  const closer = [[1], [1, 3], [1, 2, 5]].map((steps) => decadeTicks(low, high, steps));
   const even = ticks(10 ** low, 10 ** high, most).map(Math.log10); // where a decade is too long
   return [...closer, even].find(({ length }) => length > 1) ?? found;
 }
 
 // The logarithms of these multiples of every power of ten, or of every so many.
-function parts(low, high, steps, stride = 1) {
+function decadeTicks(low, high, steps, stride = 1) {
   const found = [];
   for (let k = Math.floor(low / stride) * stride; k <= high; k += stride) {
     found.push(...steps.map((step) => k + Math.log10(step)).filter((v) => v >= low && v <= high));
@@ -68,15 +68,15 @@ function parts(low, high, steps, stride = 1) {
 }
 
 // In words, the number whose logarithm this is: 0.02, 2000, 10⁻¹⁶, 5·10⁻⁷.
-export function power(exponent) {
+export function powerLabel(exponent) {
   const value = Number((10 ** exponent).toPrecision(3));
-  if (Math.abs(exponent) < 4) return label(value);
+  if (Math.abs(exponent) < 4) return tickLabel(value);
   const [mantissa, tens] = value.toExponential().split("e");
-  return `${mantissa === "1" ? "" : `${mantissa}·`}10${raised(tens)}`;
+  return `${mantissa === "1" ? "" : `${mantissa}·`}10${superscript(tens)}`;
 }
 
 // A tick's number in words.
-export function label(value) {
+export function tickLabel(value) {
   const size = Math.abs(value);
   const text = size >= 1e5 || (size > 0 && size < 1e-4) ? value.toExponential(0) : String(value);
   return text.replace("-", "−");

@@ -1,22 +1,22 @@
 // Measured channels over time, on uPlot. Beneath them, faint, the same channels of the run before.
 
 /* global uPlot */
-import { spoken } from "../figures/words.js";
-import { number } from "../format.js";
-import { thin } from "../history.js";
-import { areas, drawAreas, drawGhost, ghostSamples } from "./beneath.js";
+import { speechText } from "../figures/text_layout.js";
+import { formatNumber } from "../format.js";
+import { decimate } from "../sample_buffer.js";
 import { card } from "./card.js";
 import { CursorBox } from "./cursor_box.js";
+import { markCurves } from "./curve_marks.js";
 import { drawGuess, guessedValues } from "./guess.js";
-import { fill } from "./labels.js";
 import { Legend } from "./legend.js";
-import { markCurves } from "./marking.js";
 import { DASHES } from "./marks.js";
-import { colour, SERIES } from "./palette.js";
 import { paintTimeSeries } from "./paint_time_series.js";
-import { extent, sentences } from "./summary.js";
+import { colour, SERIES } from "./palette.js";
+import { fillPlaceholders } from "./placeholders.js";
+import { describeRange, joinSentences } from "./summary.js";
 import { symbol } from "./symbol.js";
-import { bounds } from "./ticks.js";
+import { finiteRange } from "./ticks.js";
+import { drawAreas, drawGhost, ghostSamples, stackedAreas } from "./underlays.js";
 
 const DENSITY = 3; // samples a pixel that are worth drawing
 const READ_OUT_EVERY = 100; // [ms]
@@ -67,7 +67,7 @@ export class TimeSeries {
   // The unit of what is shown; empty where the components shown have several.
   get unit() {
     const shown = [...new Set(this.curves.map(({ c }) => c))];
-    const units = new Set(shown.map((c) => fill(this.plot.unit, this.board.labels, c)));
+    const units = new Set(shown.map((c) => fillPlaceholders(this.plot.unit, this.board.labels, c)));
     return units.size === 1 ? [...units][0] : "";
   }
 
@@ -135,7 +135,7 @@ export class TimeSeries {
     if (!u || !this.visible) return;
     const [from, to] = this.board.range();
     u.batch(() => {
-      u.setData(this.samples(u.width).map(holed), false);
+      u.setData(this.samples(u.width).map(nanToNull), false);
       u.setScale("x", { min: from, max: to });
     });
     // Under a resting pointer the samples move on.
@@ -149,7 +149,7 @@ export class TimeSeries {
     const { run } = this.board;
     const [a, b] = run.span(...this.board.range());
     const stride = Math.max(1, Math.floor((b - a) / (DENSITY * width)));
-    return ["t", ...this.curves.map((curve) => curve.column)].map((name) => thin(run.column(name), a, b, stride));
+    return ["t", ...this.curves.map((curve) => curve.column)].map((name) => decimate(run.column(name), a, b, stride));
   }
 
   // On the chart of a figure, where the page has uPlot's.
@@ -167,8 +167,8 @@ export class TimeSeries {
   // once but shrinks only when much of it is empty, so that it does not tremble.
   range(low, high, data) {
     if (low === null || low === undefined) [low, high] = [Infinity, -Infinity];
-    for (const { from, to } of areas(this, data)) [low, high] = bounds(to, bounds(from, [low, high]));
-    for (const { y } of ghostSamples(this, ...this.board.range())) [low, high] = bounds(y, [low, high]);
+    for (const { from, to } of stackedAreas(this, data)) [low, high] = finiteRange(to, finiteRange(from, [low, high]));
+    for (const { y } of ghostSamples(this, ...this.board.range())) [low, high] = finiteRange(y, [low, high]);
     const guessed = guessedValues(this.guess, low, high);
     [low, high] = [Math.min(low, ...guessed), Math.max(high, ...guessed)];
     if (!(low <= high)) return [-1, 1];
@@ -236,9 +236,9 @@ export class TimeSeries {
     const names = this.board.labels[this.plot.select];
     const parts = this.curves.map(({ line, c }, i) => {
       const which = this.components > 1 && c !== null ? `, ${this.plot.select} ${names?.[c] ?? c + 1}` : "";
-      return `${spoken(symbol(line.mathml))}${which}: ${extent(all[i])} ${fill(this.plot.unit, this.board.labels, c)}`.trimEnd();
+      return `${speechText(symbol(line.mathml))}${which}: ${describeRange(all[i])} ${fillPlaceholders(this.plot.unit, this.board.labels, c)}`.trimEnd();
     });
-    return sentences(`${this.plot.title} over time, ${number(t[0], 3)} s to ${number(t[t.length - 1], 3)} s`, parts);
+    return joinSentences(`${this.plot.title} over time, ${formatNumber(t[0], 3)} s to ${formatNumber(t[t.length - 1], 3)} s`, parts);
   }
 
   resize() {
@@ -250,13 +250,13 @@ export class TimeSeries {
 }
 
 // What has no value is null to uPlot, which leaves a gap there.
-function holed(samples) {
+function nanToNull(samples) {
   return samples.some(Number.isNaN) ? Array.from(samples, (value) => (Number.isNaN(value) ? null : value)) : samples;
 }
 
 function tick(value) {
   return Math.abs(value) >= 1e5 || (value !== 0 && Math.abs(value) < 1e-3)
-    ? number(value, 2)
+    ? formatNumber(value, 2)
     : String(+value.toFixed(6)).replace("-", "−");
 }
 

@@ -5,7 +5,7 @@
 import { storeData, storedData } from "../store.js";
 import { element } from "./card.js";
 
-export class Shelf {
+export class PlotTabs {
   constructor(slug, plots, changed) {
     this.key = `plots:${slug}`;
     this.plots = this.present = plots; // all, and those that mean something now
@@ -23,7 +23,7 @@ export class Shelf {
       tab.addEventListener("click", () => {
         if (this.shown.includes(plot)) this.unpin(plot);
         else this.pin(plot);
-        this.keep();
+        this.storePinned();
       });
       tabs?.append(tab);
       return tab;
@@ -31,9 +31,9 @@ export class Shelf {
     this.four = document.getElementById("four");
     this.four?.addEventListener("click", () => {
       this.room = this.room === 4 ? 2 : 4;
-      // More room is filled from the shelf.
+      // More room is filled from the tabs.
       this.pinned = [...this.shown, ...this.present.filter((plot) => !this.shown.includes(plot))];
-      this.keep();
+      this.storePinned();
       this.show();
     });
     this.show();
@@ -75,7 +75,7 @@ export class Shelf {
     this.show();
   }
 
-  keep() {
+  storePinned() {
     storeData(this.key, { room: this.room, pinned: this.shown.map(({ plot }) => plot.title) });
   }
 

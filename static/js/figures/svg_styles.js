@@ -10,7 +10,7 @@ const DRAWN = ["rect", "line", "polyline", "polygon", "path", "circle"];
 const COLOURS = ["fill", "stroke"];
 
 // Changes the element, which must be part of the page, and all within.
-export function freeze(svg) {
+export function inlineStyles(svg) {
   for (const element of [svg, ...svg.querySelectorAll("*")]) {
     if (element.localName === "text") write(element, { ...DEFAULTS, ...TEXT });
     else if (element.localName === "tspan") write(element, inherited(element.parentElement));
@@ -35,7 +35,7 @@ function write(element, wanted) {
     if (value === standard || value === "" || (!drawn && name.startsWith("stroke-"))) continue;
     if (!COLOURS.includes(name)) element.setAttribute(name, value);
     else {
-      const [colour, opacity] = plainColour(value);
+      const [colour, opacity] = resolveColour(value);
       element.setAttribute(name, colour);
       if (opacity < 1) element.setAttribute(`${name}-opacity`, String(+opacity.toFixed(3)));
     }
@@ -46,7 +46,7 @@ const known = new Map();
 let pixel = null;
 
 // Any colour of CSS as #rrggbb and its opacity.
-function plainColour(text) {
+function resolveColour(text) {
   if (text === "none") return ["none", 1];
   if (!known.has(text)) {
     pixel ??= new OffscreenCanvas(1, 1).getContext("2d", { willReadFrequently: true });

@@ -1,15 +1,15 @@
-// Plots that leave the page: one from its card, all from the shelf. Pictures are made here, data come
-// from the server, with all their digits.
+// Plots that leave the page: one from its card, all from the row of tabs. Pictures are made here,
+// data come from the server, with all their digits.
 
 import { ROOT } from "../root.js";
 import { toast } from "../toast.js";
-import { figure } from "./figure.js";
-import { serialise } from "./vectors.js";
+import { renderFigure } from "./figure.js";
+import { serialise } from "./svg_styles.js";
 
 const SCALE = 2; // pixels of a PNG for each of the picture's
 const DATA = ["csv", "json"];
 
-export class Saving {
+export class FigureExport {
   // `about` and `session` are functions: what a figure says, the session's id.
   constructor(board, about, session) {
     Object.assign(this, { board, about, session });
@@ -48,7 +48,7 @@ export class Saving {
   }
 
   async picture(form) {
-    const drawn = figure(this.plot ? [this.plot] : this.board.shelf.present, this.about());
+    const drawn = renderFigure(this.plot ? [this.plot] : this.board.plotTabs.present, this.about());
     const text = serialise(drawn);
     if (form === "svg") return new Blob([text], { type: "image/svg+xml" });
     const image = new Image();

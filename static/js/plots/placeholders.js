@@ -1,7 +1,7 @@
 // The words of a plot that depend on the parameters: `{name}` stands for what the lab says under
 // this name, one word or one for each curve k, and `{}` for the curve's number.
 
-export function fill(text, labels, k = null) {
+export function fillPlaceholders(text, labels, k = null) {
   return text.replace(/\{(\w*)\}/g, (all, name) => {
     if (!name) return k === null ? all : String(k + 1);
     const said = labels?.[name] ?? "";

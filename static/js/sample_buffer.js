@@ -3,7 +3,7 @@
 const CAPACITY = 24000; // rows
 const SECONDS = 120;
 
-export class History {
+export class SampleBuffer {
   constructor(columns) {
     this.columns = columns;
     this.index = new Map(columns.map((name, i) => [name, i]));
@@ -26,7 +26,7 @@ export class History {
   }
 
   push(row) {
-    if (this.end === this.data[0].length) this.makeRoom();
+    if (this.end === this.data[0].length) this.compact();
     for (let i = 0; i < this.data.length; i++) this.data[i][this.end] = row[i] ?? NaN;
     this.end += 1;
     if (this.length > CAPACITY) this.start += 1;
@@ -42,7 +42,7 @@ export class History {
   // The index range, within `column`'s views, of times in [from, to], one beyond on each side.
   span(from, to) {
     const t = this.column("t");
-    return [Math.max(0, lower(t, from) - 1), Math.min(t.length, lower(t, to) + 1)];
+    return [Math.max(0, lowerBound(t, from) - 1), Math.min(t.length, lowerBound(t, to) + 1)];
   }
 
   latest(name) {
@@ -58,7 +58,7 @@ export class History {
     return n || null;
   }
 
-  makeRoom() {
+  compact() {
     const grow = this.length > this.data[0].length / 2;
     this.data = this.data.map((old) => {
       const fresh = grow ? new Float64Array(2 * old.length) : old;
@@ -71,7 +71,7 @@ export class History {
 }
 
 // Every stride-th sample of [a, b), and the last.
-export function thin(samples, a, b, stride) {
+export function decimate(samples, a, b, stride) {
   if (stride === 1) return samples.subarray(a, b);
   const first = a - (a % stride) + (a % stride ? stride : 0); // the same samples frame by frame
   const kept = [];
@@ -81,7 +81,7 @@ export function thin(samples, a, b, stride) {
 }
 
 // The first index with t[i] >= value, in an ascending array.
-function lower(t, value) {
+function lowerBound(t, value) {
   let a = 0;
   let b = t.length;
   while (a < b) {

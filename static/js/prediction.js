@@ -1,11 +1,11 @@
 // A prediction: the reader commits to a guess, which runs the experiment; then guess and outcome
 // stand together, in the card and in the plot. What was guessed stays in this browser.
 
-import { number } from "./format.js";
-import { distance, Sketch } from "./sketch.js";
-import { storedData, storeData } from "./store.js";
+import { formatNumber } from "./format.js";
+import { rmsDistance, Sketch } from "./sketch.js";
+import { storeData, storedData } from "./store.js";
 
-const READ_TWICE = 2; // what a solver has found may reach the page a moment after its status
+const OUTCOME_READINGS = 2; // what a solver has found may reach the page a moment after its status
 
 export class Prediction {
   constructor(slug, experiment, card, board, commit) {
@@ -31,7 +31,7 @@ export class Prediction {
       if (this.asked.kind === "number") this.readNumber();
     });
     for (const choice of this.form.querySelectorAll("[data-choice]")) {
-      choice.addEventListener("click", () => this.take(Number(choice.dataset.choice)));
+      choice.addEventListener("click", () => this.commitGuess(Number(choice.dataset.choice)));
     }
     if (this.asked.kind === "curve") button.addEventListener("click", () => this.sketch());
   }
@@ -39,7 +39,7 @@ export class Prediction {
   readNumber() {
     const value = this.typed();
     if (value === null) this.form.querySelector("input").focus();
-    else this.take(value);
+    else this.commitGuess(value);
   }
 
   // The number that is typed; null, and marked, if it is none.
@@ -55,7 +55,7 @@ export class Prediction {
   }
 
   // The experiment's button is pressed: what stands there counts as the guess.
-  takePending() {
+  commitPendingGuess() {
     const { kind } = this.asked;
     if (kind === "curve") this.guess = this.pad?.curve() ?? this.guess;
     else if (kind === "number" && this.form.querySelector("input").value.trim()) this.guess = this.typed() ?? this.guess;
@@ -65,26 +65,26 @@ export class Prediction {
 
   sketch() {
     const { watch, highlight, window, seconds } = this.experiment;
-    this.putAway();
+    this.closeSketch();
     this.board.setWindow(window);
     this.board.watch(watch, highlight);
     const plot = this.board.find(this.asked.plot);
     this.pad = new Sketch(plot, this.asked, seconds, (curve) => {
       this.pad.remove();
-      if (curve) this.take(curve);
-      else this.putAway();
+      if (curve) this.commitGuess(curve);
+      else this.closeSketch();
     });
     this.card.classList.add("sketching"); // where the plot may come to it: sheet.js
     plot.section.scrollIntoView({ block: "nearest" });
   }
 
-  putAway() {
+  closeSketch() {
     this.pad?.remove();
     this.pad = null;
     this.card.classList.remove("sketching");
   }
 
-  take(guess) {
+  commitGuess(guess) {
     this.guess = guess;
     this.outcome = null;
     this.save();
@@ -96,7 +96,7 @@ export class Prediction {
     this.readings = 0;
     this.outcome = null;
     if (this.guess !== null) this.board.mark(this.mark());
-    if (this.guess !== null && this.isKnown) {
+    if (this.guess !== null && this.isOutcomeKnown) {
       this.outcome = this.asked.answer;
       this.save();
     }
@@ -104,13 +104,13 @@ export class Prediction {
   }
 
   // Whether the article knows the outcome, and need not wait for it.
-  get isKnown() {
+  get isOutcomeKnown() {
     return Number.isFinite(this.asked.answer);
   }
 
   // How the session stands, since the experiment was started.
   follow(status) {
-    if (this.guess === null || this.isKnown || this.readings >= READ_TWICE) return;
+    if (this.guess === null || this.isOutcomeKnown || this.readings >= OUTCOME_READINGS) return;
     if (!this.isDue(status)) return;
     const outcome = this.read(status);
     if (!Number.isFinite(outcome)) return; // not known yet
@@ -132,7 +132,7 @@ export class Prediction {
     const { asked, experiment } = this;
     if (this.board.number !== run) return null;
     const until = solver && !experiment.run.hold ? Infinity : experiment.seconds;
-    if (asked.kind === "curve") return distance(this.guess, this.board.curve(asked.channel, until));
+    if (asked.kind === "curve") return rmsDistance(this.guess, this.board.curve(asked.channel, until));
     return this.board.read(asked.channel, asked.of, until);
   }
 
@@ -167,20 +167,20 @@ export class Prediction {
     const field = this.form.querySelector("input");
     if (field && guess !== null && document.activeElement !== field && !field.value) field.value = String(guess);
     this.verdict.hidden = guess === null;
-    if (guess !== null) this.verdict.replaceChildren(...(told ? this.sayOutcome() : this.sayWhen()));
+    if (guess !== null) this.verdict.replaceChildren(...(told ? this.outcomeText() : this.pendingText()));
   }
 
-  sayWhen() {
+  pendingText() {
     const { run, seconds } = this.experiment;
     const solved = !run.hold && document.getElementById("solver");
-    return [`${this.sayGuess()} The outcome comes ${solved ? "when the solver is done" : `at t = ${seconds} s`}.`];
+    return [`${this.guessText()} The outcome comes ${solved ? "when the solver is done" : `at t = ${seconds} s`}.`];
   }
 
-  sayGuess() {
+  guessText() {
     return this.asked.kind === "number" ? `Your guess: ${this.withUnit(this.guess)}.` : "Your guess is drawn dashed.";
   }
 
-  sayOutcome() {
+  outcomeText() {
     const { guess, outcome, asked } = this;
     if (asked.kind === "choice") {
       if (guess === outcome) return ["Right."];
@@ -189,13 +189,13 @@ export class Prediction {
     }
     if (asked.kind === "curve") return [`Your curve is off by ${this.withUnit(outcome)} (root mean square).`];
     const off = guess - outcome;
-    const part = Math.abs(off) < 10 * Math.abs(outcome) ? ` (${number(100 * Math.abs(off / outcome), 2)} %)` : "";
+    const part = Math.abs(off) < 10 * Math.abs(outcome) ? ` (${formatNumber(100 * Math.abs(off / outcome), 2)} %)` : "";
     const how = off === 0 ? "exactly it" : `${this.withUnit(Math.abs(off), 2)} too ${off > 0 ? "high" : "low"}${part}`;
     return [`Your guess: ${this.withUnit(guess)}. Outcome: `, strong(this.withUnit(outcome)), `: ${how}.`];
   }
 
   withUnit(value, digits = 3) {
-    const text = Number.isInteger(value) && Math.abs(value) < 1e6 ? String(value).replace("-", "−") : number(value, digits);
+    const text = Number.isInteger(value) && Math.abs(value) < 1e6 ? String(value).replace("-", "−") : formatNumber(value, digits);
     return `${text} ${this.asked.unit}`.trim();
   }
 }

@@ -1,7 +1,7 @@
 // The slim row of numbers and of the solver's sentence. What does not fit into it is behind a button,
 // which says how many numbers there are, and unfolds the row over the plots.
 
-export class NumbersRow {
+export class ReadoutRow {
   constructor() {
     this.row = document.querySelector(".numbers .all");
     [this.tiles, this.more, this.says] = ["tiles", "more-numbers", "solver-says"].map((id) => document.getElementById(id));
@@ -32,7 +32,7 @@ export class NumbersRow {
       this.beyond = boxes.filter((box) => box.width && (box.left < left - 1 || box.right > right + 1)).length;
       this.tiles.classList.toggle("to-right", boxes.some((box) => box.right > right + 1));
       this.tiles.classList.toggle("to-left", boxes.some((box) => box.width && box.left < left - 1));
-      this.more.hidden = !this.beyond && !isCut(this.says);
+      this.more.hidden = !this.beyond && !isTruncated(this.says);
     }
     this.more.textContent = this.open ? "×" : this.beyond ? `+${this.beyond}` : "…";
     const numbers = this.beyond ? `${this.beyond} more numbers` : "The whole sentence";
@@ -42,6 +42,6 @@ export class NumbersRow {
   }
 }
 
-function isCut(element) {
+function isTruncated(element) {
   return Boolean(element) && element.scrollWidth > element.clientWidth + 1;
 }

@@ -1,11 +1,11 @@
 // What lies beneath the curves of a time series: stacked areas, and the faint run before.
 
-import { thin } from "../history.js";
+import { decimate } from "../sample_buffer.js";
 import { colour } from "./palette.js";
 
 // The stacked curves shown, each with where it begins and ends at every sample: positive
 // values upward from zero, negative ones downward. `data` is the times, and each curve's values.
-export function* areas(plot, data) {
+export function* stackedAreas(plot, data) {
   if (!plot.plot.stacked || !data) return;
   const up = new Float64Array(data[0].length);
   const down = new Float64Array(data[0].length);
@@ -22,7 +22,7 @@ export function* areas(plot, data) {
 export function drawAreas(plot, u) {
   const ctx = clip(u, 0.6);
   const x = Array.from(u.data[0], (t) => u.valToPos(t, "x", true));
-  for (const { curve, from, to } of areas(plot, u.data)) {
+  for (const { curve, from, to } of stackedAreas(plot, u.data)) {
     ctx.fillStyle = colour(curve.tone);
     ctx.beginPath();
     to.forEach((value, k) => ctx.lineTo(x[k], u.valToPos(value, "y", true)));
@@ -40,7 +40,7 @@ export function* ghostSamples(plot, from, to) {
   for (const curve of plot.curves) {
     if (curve.line.style === "limit" || plot.isArea(curve.line) || !plot.shows(curve)) continue;
     const y = ghost.column(curve.column);
-    if (y) yield { curve, x: thin(ghost.column("t"), a, b, stride), y: thin(y, a, b, stride) };
+    if (y) yield { curve, x: decimate(ghost.column("t"), a, b, stride), y: decimate(y, a, b, stride) };
   }
 }
 

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-ANCHORS = (
+COLORMAP_ANCHORS = (
     (0.17, 0.14, 0.35),
     (0.24, 0.33, 0.62),
     (0.16, 0.55, 0.63),
@@ -20,14 +20,14 @@ ANCHORS = (
 )
 """sRGB, from the least value (dark indigo) over blue, teal and green to the largest (pale
 yellow)."""
-TO_CONES = np.array(
+LINEAR_RGB_TO_LMS = np.array(
     [
         [0.4122214708, 0.5363325363, 0.0514459929],
         [0.2119034982, 0.6806995451, 0.1073969566],
         [0.0883024619, 0.2817188376, 0.6299787005],
     ]
 )
-TO_LAB = np.array(
+LMS_TO_OKLAB = np.array(
     [
         [0.2104542553, 0.7936177850, -0.0040720468],
         [1.9779984951, -2.4285922050, 0.4505937099],
@@ -36,8 +36,8 @@ TO_LAB = np.array(
 )
 NO_VALUE = (0.62, 0.63, 0.65)
 """sRGB, grey: of what has no value."""
-STEPS = 256
-MIDDLE = 0.5
+COLORMAP_SIZE = 256
+CONSTANT_FIELD_POSITION = 0.5
 """Where a field of one value stands."""
 
 
@@ -57,19 +57,19 @@ def sequential(
     if span > 0.0:
         places = np.clip((0.5 * values - 0.5 * low) / span, 0.0, 1.0)
     else:
-        places = np.full(values.shape, MIDDLE)
-    return np.asarray(_table()[np.round(places * (STEPS - 1)).astype(int)])
+        places = np.full(values.shape, CONSTANT_FIELD_POSITION)
+    return np.asarray(_colormap()[np.round(places * (COLORMAP_SIZE - 1)).astype(int)])
 
 
 def to_oklab(srgb: np.ndarray) -> np.ndarray:
     """Lightness and two opponent colours (..., 3) of sRGB colours (..., 3) in [0, 1]."""
-    return np.asarray(np.cbrt(to_linear(srgb) @ TO_CONES.T) @ TO_LAB.T)
+    return np.asarray(np.cbrt(to_linear(srgb) @ LINEAR_RGB_TO_LMS.T) @ LMS_TO_OKLAB.T)
 
 
 def from_oklab(lab: np.ndarray) -> np.ndarray:
     """sRGB colours (..., 3) of OKLab (..., 3); what no screen shows is cut off to [0, 1]."""
-    cones = (lab @ np.linalg.inv(TO_LAB).T) ** 3
-    return from_linear(np.clip(cones @ np.linalg.inv(TO_CONES).T, 0.0, 1.0))
+    cones = (lab @ np.linalg.inv(LMS_TO_OKLAB).T) ** 3
+    return from_linear(np.clip(cones @ np.linalg.inv(LINEAR_RGB_TO_LMS).T, 0.0, 1.0))
 
 
 def to_linear(srgb: np.ndarray) -> np.ndarray:
@@ -84,11 +84,11 @@ def from_linear(linear: np.ndarray) -> np.ndarray:
 
 
 @cache
-def _table() -> np.ndarray:
-    """The map at STEPS places, equally far apart along the way."""
-    anchors = to_oklab(np.array(ANCHORS))
+def _colormap() -> np.ndarray:
+    """The map at COLORMAP_SIZE places, equally far apart along the way."""
+    anchors = to_oklab(np.array(COLORMAP_ANCHORS))
     reached = np.cumsum([0.0, *np.linalg.norm(np.diff(anchors, axis=0), axis=1)])
-    places = np.linspace(0.0, reached[-1], STEPS)
+    places = np.linspace(0.0, reached[-1], COLORMAP_SIZE)
     table = from_oklab(np.stack([np.interp(places, reached, axis) for axis in anchors.T], axis=-1))
     table.flags.writeable = False
     return table

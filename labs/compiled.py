@@ -31,7 +31,7 @@ def inlined(function: F) -> F:
 
 def _compiled(function: F, inline: bool) -> F:
     machine_code = numba.njit(
-        cache=KEPT is not None,
+        cache=CACHE_FOLDER is not None,
         nogil=True,
         error_model="numpy",
         fastmath={"contract"},
@@ -50,7 +50,7 @@ def source_digest(package: Path) -> str:
     return digest.hexdigest()
 
 
-def forget_stale(package: Path, digest: str) -> bool:
+def delete_stale_cache(package: Path, digest: str) -> bool:
     """Deletes what was compiled in a package from sources of another digest; whether it did. Numba
     sees that a function's own file changed, but not the file of a function it calls."""
     stamp = package / "__pycache__" / "compiled.sha256"
@@ -65,7 +65,7 @@ def forget_stale(package: Path, digest: str) -> bool:
     return True
 
 
-class _Compilation(event.Listener):
+class _CompilationListener(event.Listener):
     def __init__(self, tell: Callable[[], None]) -> None:
         self._tell = tell
 
@@ -79,7 +79,7 @@ class _Compilation(event.Listener):
 @contextlib.contextmanager
 def on_compilation(tell: Callable[[], None]) -> Iterator[None]:
     """Within it, `tell` is called whenever a function is compiled that was not found on disk."""
-    with event.install_listener("numba:compile", _Compilation(tell)):
+    with event.install_listener("numba:compile", _CompilationListener(tell)):
         yield
 
 
@@ -97,12 +97,12 @@ def cache_folder(package: Path, digest: str) -> str | None:
         folder = Path(parent) / f"numba-orclab-{os.getuid()}" / digest
         with contextlib.suppress(OSError):
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            if _is_own(folder.parent) and _is_own(folder):
+            if _is_private(folder.parent) and _is_private(folder):
                 return str(folder)
     return None
 
 
-def _is_own(folder: Path) -> bool:
+def _is_private(folder: Path) -> bool:
     """Whether nobody else may write to it: code is loaded from there."""
     about = folder.lstat()
     safe = about.st_uid == os.getuid() and not about.st_mode & 0o022
@@ -124,7 +124,7 @@ def _prepare_cache(package: Path) -> str | None:
         os.environ["NUMBA_CACHE_DIR"] = folder
         config.reload_config()  # type: ignore[no-untyped-call]
     elif folder == "":
-        forget_stale(package, digest)
+        delete_stale_cache(package, digest)
     return folder
 
 
@@ -141,6 +141,6 @@ def cache_note(folder: str | None) -> str:
     return ""
 
 
-KEPT = _prepare_cache(Path(__file__).parent)
+CACHE_FOLDER = _prepare_cache(Path(__file__).parent)
 """As `cache_folder` says."""
-NOTE = cache_note(KEPT)
+CACHE_NOTE = cache_note(CACHE_FOLDER)

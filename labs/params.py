@@ -13,17 +13,26 @@ from pydantic_core import ErrorDetails
 from pydantic_core.core_schema import ValidationInfo
 
 from labs.errors import LabError, ParameterError
-from labs.number_texts import LONGEST_NUMBER
-from labs.tunables import Choice, Effect, Group, Knob, Text, Toggle, Tunable, Value, When
+from labs.number_texts import MAX_NUMBER_LENGTH
+from labs.tunables import Choice, Condition, Effect, Group, Knob, Text, Toggle, Tunable, Value
 
 __all__ = [
-    "Choice", "Effect", "Group", "Knob", "Params", "Text", "Toggle", "Tunable", "Value", "When",
-    "readable",
+    "Choice",
+    "Condition",
+    "Effect",
+    "Group",
+    "Knob",
+    "Params",
+    "Text",
+    "Toggle",
+    "Tunable",
+    "Value",
+    "validated_by",
 ]  # fmt: skip
 
 
-def readable(read: Callable[[str], object]) -> AfterValidator:
-    """For the type of a text field, Annotated[str, readable(read)]: what `read` refuses with a
+def validated_by(read: Callable[[str], object]) -> AfterValidator:
+    """For the type of a text field, Annotated[str, validated_by(read)]: what `read` refuses with a
     LabError is refused in the same words."""
 
     def check(text: str) -> str:
@@ -73,7 +82,7 @@ class Params(BaseModel):
 
     @classmethod
     def _check_governor(cls, what: str, governor: str, values: tuple[Value, ...]) -> None:
-        if not values or set(values) - _options(cls.tunables.get(governor)):
+        if not values or set(values) - _choice_values(cls.tunables.get(governor)):
             raise TypeError(
                 f"{cls.__name__}: {what} when {governor} is one of {values}, but these are no "
                 "options of a choice or a toggle"
@@ -147,7 +156,7 @@ class Params(BaseModel):
         return f"{shown}: {name} takes true or false"
 
 
-def _options(tunable: Tunable | None) -> set[Any]:
+def _choice_values(tunable: Tunable | None) -> set[Any]:
     """What others may depend on."""
     if isinstance(tunable, Choice):
         return set(tunable.options)
@@ -168,6 +177,6 @@ def _from_text(text: str, tunable: Tunable | None) -> object:
 
 def _number(text: str) -> float | str:
     try:
-        return float(text) if len(text) <= LONGEST_NUMBER else text
+        return float(text) if len(text) <= MAX_NUMBER_LENGTH else text
     except ValueError:
         return text

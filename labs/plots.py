@@ -54,8 +54,10 @@ class TimeSeries:
         lead: int = 0,
         when: ShownWhen = ALWAYS,
     ) -> None:
-        _set(self, title=title, unit=unit, lines=lines, select=select, stacked=stacked, lead=lead)
-        _set(self, when=when)
+        _set_fields(
+            self, title=title, unit=unit, lines=lines, select=select, stacked=stacked, lead=lead
+        )
+        _set_fields(self, when=when)
 
 
 @dataclass(frozen=True)
@@ -111,8 +113,10 @@ class Curves:
         when: ShownWhen = ALWAYS,
     ) -> None:
         labels = {"title": title, "x_label": x_label, "y_label": y_label}
-        _set(self, **labels, traces=traces, log_x=log_x, log_y=log_y, guide=guide, equal=equal)
-        _set(self, gaps=gaps, when=when)
+        _set_fields(
+            self, **labels, traces=traces, log_x=log_x, log_y=log_y, guide=guide, equal=equal
+        )
+        _set_fields(self, gaps=gaps, when=when)
 
 
 @dataclass(frozen=True)
@@ -194,7 +198,7 @@ Card = TimeSeries | Curves | HeatMap | Matrix | Bars | Note
 Plot = Card | Readout
 
 
-def measured(plot: Plot) -> tuple[str, ...]:
+def channel_names(plot: Plot) -> tuple[str, ...]:
     """The channels of `Lab.measure` a plot shows."""
     if isinstance(plot, TimeSeries):
         return tuple(line.channel for line in plot.lines)
@@ -229,14 +233,14 @@ def label_names(plot: Plot) -> tuple[str, ...]:
     """The names of `Lab.labels` a plot may show."""
     match plot:
         case TimeSeries(unit=unit, select=select):
-            return _words(unit) + ((select,) if select else ())
+            return _placeholders(unit) + ((select,) if select else ())
         case Curves(x_label=x_label, y_label=y_label, traces=traces):
             labels = [trace.label for trace in traces if isinstance(trace.label, str)]
-            return _words(x_label, y_label, *labels)
+            return _placeholders(x_label, y_label, *labels)
         case HeatMap(x_label=x_label, y_label=y_label, z_label=z_label):
-            return _words(x_label, y_label, z_label)
+            return _placeholders(x_label, y_label, z_label)
         case Readout(label=label, unit=unit):
-            return _words(label, unit)
+            return _placeholders(label, unit)
         case Matrix(rows=names) | Bars(names=names):
             return (names,) if names else ()
         case _:
@@ -268,12 +272,12 @@ def describe(plot: Plot) -> dict[str, Any]:
     return data
 
 
-def _words(*texts: str) -> tuple[str, ...]:
+def _placeholders(*texts: str) -> tuple[str, ...]:
     """The names that stand in braces."""
     return tuple(name for text in texts for name in re.findall(r"\{(\w+)\}", text))
 
 
-def _set(plot: Any, **values: Any) -> None:
+def _set_fields(plot: Any, **values: Any) -> None:
     """The fields of a frozen plot, as its own __init__ sets them."""
     for name, value in values.items():
         object.__setattr__(plot, name, value)

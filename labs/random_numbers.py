@@ -28,38 +28,38 @@ def _layers() -> np.ndarray:
 _ENDS = _layers()
 
 
-def seeded(rng: np.random.Generator, many: int) -> np.ndarray:
+def random_states(rng: np.random.Generator, many: int) -> np.ndarray:
     """(many, 4) uint64: independent states drawn from `rng`."""
     return rng.integers(1, 2**64, size=(many, 4), dtype=np.uint64)
 
 
 @compiled
-def _rotated(x: np.uint64, k: int) -> np.uint64:
+def _rotate_left(x: np.uint64, k: int) -> np.uint64:
     return np.uint64((x << np.uint64(k)) | (x >> np.uint64(64 - k)))
 
 
 @compiled
-def bits(state: np.ndarray) -> np.uint64:
+def random_bits(state: np.ndarray) -> np.uint64:
     """64 random bits."""
-    drawn = np.uint64(_rotated(state[0] + state[3], 23) + state[0])
+    drawn = np.uint64(_rotate_left(state[0] + state[3], 23) + state[0])
     shifted = state[1] << np.uint64(17)
     state[2] ^= state[0]
     state[3] ^= state[1]
     state[1] ^= state[2]
     state[0] ^= state[3]
     state[2] ^= shifted
-    state[3] = _rotated(state[3], 45)
+    state[3] = _rotate_left(state[3], 45)
     return drawn
 
 
 @compiled
 def uniform(state: np.ndarray) -> float:
     """A float in [0, 1), one of 2^53 equally likely."""
-    return float(bits(state) >> np.uint64(11)) * _SCALE
+    return float(random_bits(state) >> np.uint64(11)) * _SCALE
 
 
 @compiled
-def below(state: np.ndarray, n: int) -> int:
+def random_integer(state: np.ndarray, n: int) -> int:
     """An integer in 0..n-1. For the few hundred it is asked for, none is favoured by more than
     n / 2^53."""
     return int(uniform(state) * n)
@@ -69,30 +69,30 @@ def below(state: np.ndarray, n: int) -> int:
 def normal(state: np.ndarray) -> float:
     """A float of the standard normal distribution: the ziggurat of Marsaglia and Tsang (2000) as
     Doornik (2005) has it, a layer and a place in it from separate bits."""
-    drawn = bits(state)
+    drawn = random_bits(state)
     layer = int(drawn & np.uint64(_LAYERS - 1))
     x = (2.0 * (float(drawn >> np.uint64(11)) * _SCALE) - 1.0) * _ENDS[layer]
     # Nearly always it is in the part of the layer that lies wholly under the density.
-    return float(x) if abs(x) < _ENDS[layer + 1] else _at_the_edge(state, layer, x)
+    return float(x) if abs(x) < _ENDS[layer + 1] else _sample_layer_edge(state, layer, x)
 
 
 @compiled
-def _at_the_edge(state: np.ndarray, layer: int, x: float) -> float:
+def _sample_layer_edge(state: np.ndarray, layer: int, x: float) -> float:
     while abs(x) >= _ENDS[layer + 1]:
         if layer == 0:
-            return float(np.copysign(_tail(state), x))
+            return float(np.copysign(_sample_tail(state), x))
         outer = np.exp(-0.5 * (_ENDS[layer] ** 2 - x * x))
         inner = np.exp(-0.5 * (_ENDS[layer + 1] ** 2 - x * x))
         if outer + uniform(state) * (inner - outer) < 1.0:
             break
-        drawn = bits(state)
+        drawn = random_bits(state)
         layer = int(drawn & np.uint64(_LAYERS - 1))
         x = (2.0 * (float(drawn >> np.uint64(11)) * _SCALE) - 1.0) * _ENDS[layer]
     return float(x)
 
 
 @compiled
-def _tail(state: np.ndarray) -> float:
+def _sample_tail(state: np.ndarray) -> float:
     """Of the normal distribution beyond _TAIL."""
     while True:
         x = -np.log(1.0 - uniform(state)) / _TAIL

@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 Resumable = Generator[None, None, T]
 """Pauses at every `yield`; its result is what it returns."""
-PIECE = 5e6
+OPERATIONS_BETWEEN_PAUSES = 5e6
 """Operations between two pauses."""
 
 
@@ -25,10 +25,10 @@ def run_to_completion(work: Resumable[T]) -> T:
             return result
 
 
-def pieces(many: int, work: float) -> Iterator[int]:
+def split_work(many: int, work: float) -> Iterator[int]:
     """How many to do before each pause, of so many equal things of `work` operations each: about
-    PIECE of these, some milliseconds where one takes a nanosecond."""
-    share = max(1, int(PIECE / work))
+    OPERATIONS_BETWEEN_PAUSES of these, some milliseconds where one takes a nanosecond."""
+    share = max(1, int(OPERATIONS_BETWEEN_PAUSES / work))
     for begun in range(0, many, share):
         yield min(share, many - begun)
 

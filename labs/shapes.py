@@ -8,12 +8,12 @@ import pinocchio as pin
 
 Vector3 = tuple[float, float, float]
 
-DARK: Vector3 = (0.36, 0.39, 0.44)
-LIGHT: Vector3 = (0.62, 0.65, 0.7)
+DARK_GRAY: Vector3 = (0.36, 0.39, 0.44)
+LIGHT_GRAY: Vector3 = (0.62, 0.65, 0.7)
 BLUE: Vector3 = (0.16, 0.42, 0.76)
 ORANGE: Vector3 = (0.88, 0.5, 0.16)
 """Colours of bodies that bring no material: mounts, rails, first and second links."""
-STEEL: tuple[Vector3, Vector3] = ((0.6, 0.65, 0.72), (0.42, 0.48, 0.57))
+STEEL_COLORS: tuple[Vector3, Vector3] = ((0.6, 0.65, 0.72), (0.42, 0.48, 0.57))
 """Of an arm's links in turn, so that one tells them apart; dark enough for a white background."""
 
 

@@ -15,18 +15,18 @@ Effect = Literal["live", "solve", "restart"]
 Scale = Literal["linear", "log"]
 Value = float | str | bool
 
-Choices = Mapping[str, Value | Sequence[Value]]
+ChoiceCondition = Mapping[str, Value | Sequence[Value]]
 """By the name of a choice or a toggle the value, or the values, it must have: all of them."""
-When = Choices | Sequence[Choices]
+Condition = ChoiceCondition | Sequence[ChoiceCondition]
 """Under which choices a tunable acts: such choices, or several that each suffice."""
 
 # A logarithmic slider that reaches zero bends to linear below high / LOG_SPAN.
 LOG_SPAN = 1000.0
-TEXT_LENGTH = 400
-LONGEST_TEXT = 32_000
+DEFAULT_TEXT_LENGTH = 400
+MAX_TEXT_LENGTH = 32_000
 """Half of what a request may hold, for line ends and quotes are two characters there; a link leaves
 out what is too long for it."""
-ALWAYS: When = ()
+ALWAYS: Condition = ()
 NO_UNITS: Mapping[str, Mapping[Value, str]] = {}
 
 
@@ -127,20 +127,20 @@ class Toggle(Tunable):
 @dataclass(frozen=True, kw_only=True)
 class Text(Tunable):
     """A short text, such as the rows of a table. What it must say, the lab's model validates:
-    by its type (`labs.params.readable`), or with a `field_validator` that raises ValueError, its
-    message a sentence that helps."""
+    by its type (`labs.params.validated_by`), or with a `field_validator` that raises ValueError,
+    its message a sentence that helps."""
 
     rows: int
     max_length: int
     """Characters."""
 
 
-class Shared(TypedDict, total=False):
+class TunableOptions(TypedDict, total=False):
     """What may be said of any tunable."""
 
     effect: Effect
     key: bool
-    when: When
+    when: Condition
     help: str
 
 
@@ -166,7 +166,7 @@ class Group:
 
     name: str = ""
     effect: Effect = "live"
-    when: When = ALWAYS
+    when: Condition = ALWAYS
 
     def knob(
         self,
@@ -180,7 +180,7 @@ class Group:
         step: float = 0.0,
         scale: Scale = "linear",
         units: Mapping[str, Mapping[Value, str]] = NO_UNITS,
-        **shared: Unpack[Shared],
+        **shared: Unpack[TunableOptions],
     ) -> Any:
         """A number in [low, high] with a slider. `step` is the slider's grain (0: a thousandth).
         What is measured may depend on a choice: `units={"system": {"mass": "m"}}`."""
@@ -195,13 +195,13 @@ class Group:
         label: str,
         symbol: str = "",
         unit: str = "",
-        **shared: Unpack[Shared],
+        **shared: Unpack[TunableOptions],
     ) -> Any:
         """One of a few values; `options` maps each value to the words shown for it."""
         choice = Choice(**self._tunable(label, symbol, **shared), options=options, unit=unit)
         return _field(default, choice, json_schema_extra={"enum": list(options)})
 
-    def toggle(self, default: bool, label: str, **shared: Unpack[Shared]) -> Any:
+    def toggle(self, default: bool, label: str, **shared: Unpack[TunableOptions]) -> Any:
         """On or off."""
         return _field(default, Toggle(**self._tunable(label, "", **shared)))
 
@@ -212,13 +212,14 @@ class Group:
         symbol: str = "",
         *,
         rows: int = 1,
-        max_length: int = TEXT_LENGTH,
-        **shared: Unpack[Shared],
+        max_length: int = DEFAULT_TEXT_LENGTH,
+        **shared: Unpack[TunableOptions],
     ) -> Any:
-        """A text of at most `max_length` characters (up to LONGEST_TEXT), shown in `rows` lines."""
-        if not 1 <= max_length <= LONGEST_TEXT:
+        """A text of at most `max_length` characters (up to MAX_TEXT_LENGTH), shown in `rows`
+        lines."""
+        if not 1 <= max_length <= MAX_TEXT_LENGTH:
             raise ValueError(
-                f"max_length = {max_length}: a text holds from 1 to {LONGEST_TEXT} characters"
+                f"max_length = {max_length}: a text holds from 1 to {MAX_TEXT_LENGTH} characters"
             )
         text = Text(**self._tunable(label, symbol, **shared), rows=rows, max_length=max_length)
         return _field(default, text, max_length=max_length)
@@ -230,7 +231,7 @@ class Group:
         *,
         effect: Effect | None = None,
         key: bool = False,
-        when: When = ALWAYS,
+        when: Condition = ALWAYS,
         help: str = "",
     ) -> dict[str, Any]:
         """What all kinds of tunables share."""
@@ -247,7 +248,7 @@ class Group:
         }
 
 
-def _alternatives(when: When) -> Iterator[dict[str, tuple[Value, ...]]]:
+def _alternatives(when: Condition) -> Iterator[dict[str, tuple[Value, ...]]]:
     for choices in [when] if isinstance(when, Mapping) else when:
         yield {
             name: (values,) if isinstance(values, str | float | int) else tuple(values)

@@ -11,10 +11,10 @@ from fastapi import APIRouter, Body, FastAPI, Query, Request
 from fastapi.responses import FileResponse
 from starlette.background import BackgroundTask
 
-from labs.engine.catalog import catalog, find
+from labs.engine.catalog import catalog, find_lab
 from labs.engine.plot_data import file_name
 from labs.engine.record import versions
-from server import pages, problems, proxy, stream
+from server import error_responses, pages, proxy, stream
 from server.commands import Command, execute
 from server.guard import Guard
 from server.messages import (
@@ -27,7 +27,7 @@ from server.messages import (
     SessionInfo,
 )
 from server.scratch import scratch_folder
-from server.session import Session, Unavailable
+from server.session import Session, SessionUnavailable
 from server.sessions import Sessions
 from server.settings import Settings
 from server.supervisor import Supervisor
@@ -38,7 +38,7 @@ MEDIA = {
     "npz": "application/octet-stream",
     "zip": "application/zip",
 }
-api = APIRouter(prefix="/api", responses=problems.RESPONSES)
+api = APIRouter(prefix="/api", responses=error_responses.ERROR_RESPONSES)
 
 
 def create_app(settings: Settings | None = None) -> FastAPI:
@@ -74,8 +74,8 @@ def create_app(settings: Settings | None = None) -> FastAPI:
     app.include_router(health)
     app.include_router(stream.router)
     app.include_router(proxy.router)
-    pages.install(app)
-    problems.install(app)
+    pages.install_pages(app)
+    error_responses.install_handlers(app)
     return app
 
 
@@ -118,9 +118,11 @@ async def list_labs() -> list[LabInfo]:
 async def create_session(request: Request, new: NewSession) -> SessionInfo:
     """Opens a lab."""
     try:
-        session = await _sessions(request).create(find(new.lab), new)
+        session = await _sessions(request).create(find_lab(new.lab), new)
     except asyncio.CancelledError:
-        raise Unavailable("the server stops: start it again, and open the lab anew") from None
+        raise SessionUnavailable(
+            "the server stops: start it again, and open the lab anew"
+        ) from None
     return session.info()
 
 
@@ -167,7 +169,7 @@ async def export(
 ) -> FileResponse:
     """The recorded run: channels, parameters and their changes, versions, what it covers."""
     session = _session(request, session_id)
-    return await _file(request, session, "export", form, f"{session.entry.slug}.{form}")
+    return await _file_response(request, session, "export", form, f"{session.entry.slug}.{form}")
 
 
 @api.get(
@@ -180,7 +182,9 @@ async def save_solution(
 ) -> FileResponse:
     """What is shown of the solver, with the parameters and the seed it belongs to."""
     session = _session(request, session_id)
-    return await _file(request, session, "solution", form, f"{session.entry.slug}-solution.{form}")
+    return await _file_response(
+        request, session, "solution", form, f"{session.entry.slug}-solution.{form}"
+    )
 
 
 @api.get(
@@ -198,7 +202,7 @@ async def plots(
     session = _session(request, session_id)
     name = "-".join(filter(None, (session.entry.slug, file_name(title) if title else "plots")))
     titles = [title] if title else []
-    return await _file(request, session, "plots", form, f"{name}.{form}", titles=titles)
+    return await _file_response(request, session, "plots", form, f"{name}.{form}", titles=titles)
 
 
 @api.put(
@@ -217,7 +221,7 @@ async def load_solution(request: Request, session_id: str) -> ParamValues:
     """Begins anew with a saved solution (the file, JSON or NPZ) and its parameters, and pauses
     the solver, which goes on from there; answers all parameters."""
     session = _session(request, session_id)
-    path = _temporary(request)
+    path = _temporary_path(request)
     try:
         with path.open("wb") as file:
             async for part in request.stream():
@@ -227,13 +231,13 @@ async def load_solution(request: Request, session_id: str) -> ParamValues:
         path.unlink()
 
 
-async def _file(
+async def _file_response(
     request: Request, session: Session, what: str, form: str, name: str, **more: Any
 ) -> FileResponse:
     """A file that the session's worker writes."""
-    path = _temporary(request)
+    path = _temporary_path(request)
     try:
-        await session.write(what, form, str(path), **more)
+        await session.write_file(what, form, str(path), **more)
     except BaseException:
         path.unlink()
         raise
@@ -242,7 +246,7 @@ async def _file(
     )
 
 
-def _temporary(request: Request) -> Path:
+def _temporary_path(request: Request) -> Path:
     with tempfile.NamedTemporaryFile(dir=request.app.state.folder, delete=False) as file:
         return Path(file.name)
 

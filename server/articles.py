@@ -21,8 +21,8 @@ from labs.errors import LabError
 from labs.params import Params
 from server import experiments
 from server.experiments import Experiment
-from server.formulas import ArticleError, tex
-from server.line_breaks import statements
+from server.formulas import ArticleError, tex_to_mathml
+from server.line_breaks import split_statements
 
 GREEK = frozenset("αβγδεϵζηθϑικλμνξπρσςτυφϕχψω")
 NAMED = re.compile("&(?!lt;|gt;|amp;)[A-Za-z]+;")
@@ -45,28 +45,28 @@ def render(entry: CatalogEntry) -> Article:
 def render_text(entry: CatalogEntry, text: str) -> Article:
     """As `render`, of a given text."""
     try:
-        return _Writer(entry).write(text)
+        return _ArticleRenderer(entry).write(text)
     except LabError as error:
         raise ArticleError(f"the article of {entry.slug}: {error}") from None
 
 
-def words(text: str) -> str:
+def search_words(text: str) -> str:
     """The distinct words of a Markdown text in lower case, for searching."""
     found = re.findall(r"[^\W\d_]{3,}", re.sub(r"\$[^$]*\$", " ", text).lower())
     return " ".join(sorted(set(found)))
 
 
-class _Writer:
+class _ArticleRenderer:
     """Renders one article; collects its experiments in order."""
 
     def __init__(self, entry: CatalogEntry) -> None:
         self.entry = entry
         self.experiments: list[Experiment] = []
-        self.symbols = _Symbols(entry.lab.Params)
+        self.symbols = _SymbolMarker(entry.lab.Params)
         self.markdown = MarkdownIt("commonmark", {"html": False}).enable("table")
         self.markdown.use(dollarmath_plugin, allow_digits=False, double_inline=True)
         self.markdown.core.ruler.before("inline", "first_formula", _shield_first_formula)
-        self.markdown.core.ruler.push("touching", _keep_together)
+        self.markdown.core.ruler.push("touching", _join_punctuation)
         for rule, method in (
             ("math_inline", self._inline),
             ("math_inline_double", self._display),
@@ -90,7 +90,9 @@ class _Writer:
     def _display(self, tokens: Sequence[Token], i: int, *_: Any) -> str:
         """In pieces, between which a narrow column breaks the line."""
         source = tokens[i].content
-        lines = [[tex(piece, True) for piece in pieces] for pieces in statements(source)]
+        lines = [
+            [tex_to_mathml(piece, True) for piece in pieces] for pieces in split_statements(source)
+        ]
         spans = [
             f"<span>{'<wbr>'.join(map(self.symbols.display, pieces))}</span>" for pieces in lines
         ]
@@ -113,9 +115,9 @@ class _Writer:
                 options,
                 env,
             )
-        experiment = experiments.read(self.entry, tokens[i].content, self._text)
+        experiment = experiments.read_experiment(self.entry, tokens[i].content, self._text)
         self.experiments.append(experiment)
-        return experiments.card(experiment, len(self.experiments))
+        return experiments.render_card(experiment, len(self.experiments))
 
     def _figure(self, tokens: Sequence[Token], i: int, *_: Any) -> str:
         """A drawing beside the article, `![what it shows](NAME.svg)`. It stands in the page itself,
@@ -132,7 +134,7 @@ class _Writer:
         return str(self.markdown.render(_escape_number(markdown)))
 
 
-class _Symbols:
+class _SymbolMarker:
     """Marks the symbols that have a slider, so that the page can show and change them where
     they stand."""
 
@@ -140,7 +142,7 @@ class _Symbols:
         named = {name: t for name, t in params.tunables.items() if t.symbol}
         self.labels = {name: t.label for name, t in named.items()}
         self.names = {t.symbol.strip(): name for name, t in named.items()}
-        whole = {_inner(tex(t.symbol)): name for name, t in named.items()}
+        whole = {_inner_mathml(tex_to_mathml(t.symbol)): name for name, t in named.items()}
         self.parts = {part: name for part, name in whole.items() if part.count("<") > 2}
         # A Latin letter inside a formula may be an index or a matrix as well: those stay unmarked.
         single = {re.sub("</?mi>", "", part): name for part, name in whole.items()}
@@ -149,8 +151,8 @@ class _Symbols:
     def inline(self, source: str) -> str:
         name = self.names.get(source.strip())
         if name is None:
-            return self.mark(tex(source))
-        shown = tex(source)
+            return self.mark(tex_to_mathml(source))
+        shown = tex_to_mathml(source)
         label = escape(self.labels[name])
         return (
             f'<span class="symbol" role="button" tabindex="0" data-param="{name}"'
@@ -199,21 +201,24 @@ def _shield_first_formula(state: StateCore) -> None:
             token.content += "\u200b"  # a space without width
 
 
-def _keep_together(state: StateCore) -> None:
+def _join_punctuation(state: StateCore) -> None:
     """What touches a formula, a bracket before it or a comma after it, stays on its line."""
     for token in state.tokens:
         children = token.children or []
         for i in reversed(range(len(children))):
             if children[i].type != "math_inline":
                 continue
-            before = _take(children, i - 1, r"[^\s\u200b]*\Z")
-            after = _take(children, i + 1, r"\A[^\s\u200b]*")
+            before = _cut_match(children, i - 1, r"[^\s\u200b]*\Z")
+            after = _cut_match(children, i + 1, r"\A[^\s\u200b]*")
             if before or after:
-                opening, closing = _html(f'<span class="joined">{before}'), _html(f"{after}</span>")
+                opening, closing = (
+                    _html_token(f'<span class="joined">{before}'),
+                    _html_token(f"{after}</span>"),
+                )
                 children[i : i + 1] = [opening, children[i], closing]
 
 
-def _take(children: Sequence[Token], i: int, pattern: str) -> str:
+def _cut_match(children: Sequence[Token], i: int, pattern: str) -> str:
     """Cuts what a pattern finds out of a text, if the i-th is one; as HTML."""
     if not 0 <= i < len(children) or children[i].type != "text":
         return ""
@@ -222,9 +227,9 @@ def _take(children: Sequence[Token], i: int, pattern: str) -> str:
     return escape(found[0]) if found else ""
 
 
-def _html(source: str) -> Token:
+def _html_token(source: str) -> Token:
     return Token("html_inline", "", 0, content=source)
 
 
-def _inner(formula: str) -> str:
+def _inner_mathml(formula: str) -> str:
     return re.sub(r"^<math[^>]*>|</math>$", "", formula)

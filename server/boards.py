@@ -20,13 +20,13 @@ CELLS_EVERY = 0.09
 """[s] Between two updates of a board's colours."""
 SURFACE_EVERY = 0.19
 """[s] Between two updates of a surface: they are long messages."""
-PREPARED = 0.12
+PREPARE_SECONDS = 0.12
 """[s] A viewer has to prepare a surface it was sent, before it shows it."""
 
 FLAT = 1e-6
 """[m] So little is as good as nothing."""
 
-Clicked = Callable[[tuple[float, float, float]], None]
+ClickCallback = Callable[[tuple[float, float, float]], None]
 
 
 def cell_corners(
@@ -47,7 +47,7 @@ class CellsNode(Node):
         origin: tuple[float, float, float],
         size: float,
         colors: np.ndarray,
-        clicked: Clicked | None,
+        clicked: ClickCallback | None,
         view: View,
     ) -> None:
         self._exposure = exposure(view)
@@ -61,7 +61,7 @@ class CellsNode(Node):
             np.array([[0, 1, 2], [0, 2, 3]], np.uint32),
             batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (rows * columns, 1)),
             batched_positions=centers,
-            batched_colors=_bytes(colors, self._exposure),
+            batched_colors=_instance_colors(colors, self._exposure),
             lod="off",
             side="double",
             cast_shadow=False,
@@ -69,7 +69,7 @@ class CellsNode(Node):
         if clicked:
 
             async def on_click(event: Any) -> None:
-                point = _on_plane(event.ray_origin, event.ray_direction, origin[2])
+                point = _intersect_plane(event.ray_origin, event.ray_direction, origin[2])
                 if point is not None:
                     clicked(point)
 
@@ -77,12 +77,12 @@ class CellsNode(Node):
         super().__init__(board)
         self._when = 0.0
 
-    def paint(self, colors: np.ndarray) -> None:
+    def set_colors(self, colors: np.ndarray) -> None:
         """Gives the cells these colours."""
         now = time.monotonic()
         if now - self._when > CELLS_EVERY:
             self._when = now
-            self.send("batched_colors", _bytes(colors, self._exposure))
+            self.set_property("batched_colors", _instance_colors(colors, self._exposure))
 
 
 class SurfaceNode(Node):
@@ -99,14 +99,14 @@ class SurfaceNode(Node):
     ) -> None:
         super().__init__(server.scene.add_frame(path, show_axes=False))
         self._exposure = exposure(view, points)
-        data = glb(points, colors, self._exposure)
+        data = surface_glb(points, colors, self._exposure)
         self._shown, self._hidden = (
             server.scene.add_glb(f"{path}/{copy}", data, visible=copy == 0, cast_shadow=False)
             for copy in range(2)
         )
         # A speck that stays: while something wears a shader, the viewer need not compile it again.
         speck = np.broadcast_to(points.reshape(-1, 3).mean(axis=0), (2, 2, 3))
-        data = glb(speck, np.ones((2, 2, 3)), self._exposure)
+        data = surface_glb(speck, np.ones((2, 2, 3)), self._exposure)
         server.scene.add_glb(f"{path}/speck", data, cast_shadow=False)
         self._last = np.stack([points, colors])
         self._when = time.monotonic()
@@ -115,13 +115,13 @@ class SurfaceNode(Node):
     def draw(self, points: np.ndarray, colors: np.ndarray) -> None:
         """Sends what changed, and shows what was sent some time ago."""
         since = time.monotonic() - self._when
-        if self._preparing and since > PREPARED:
+        if self._preparing and since > PREPARE_SECONDS:
             self._shown.visible, self._hidden.visible = False, True
             self._shown, self._hidden = self._hidden, self._shown
             self._preparing = False
         now = np.stack([points, colors])
         if since > SURFACE_EVERY and not np.array_equal(now, self._last):
-            self._hidden.glb_data = glb(points, colors, self._exposure)
+            self._hidden.glb_data = surface_glb(points, colors, self._exposure)
             self._last = now
             self._when = time.monotonic()
             self._preparing = True
@@ -139,7 +139,7 @@ def exposure(view: View, points: np.ndarray | None = None) -> float:
     return standing if along.min() < FLAT else lying
 
 
-def glb(points: np.ndarray, colors: np.ndarray, exposure: float) -> bytes:
+def surface_glb(points: np.ndarray, colors: np.ndarray, exposure: float) -> bytes:
     """A surface through `points` (rows, columns, 3) with a colour (rows, columns, 3) a point, in
     binary glTF 2.0. The viewer computes the normals."""
     corners = points.reshape(-1, 3).astype("<f4")
@@ -211,12 +211,12 @@ def _chunk(kind: bytes, data: bytes, filler: bytes) -> bytes:
     return np.array([len(data)], "<u4").tobytes() + kind + data
 
 
-def _bytes(colors: np.ndarray, exposure: float) -> np.ndarray:
+def _instance_colors(colors: np.ndarray, exposure: float) -> np.ndarray:
     """Per-instance colours as Viser takes them: linear, not sRGB."""
     return np.round(255 / exposure * to_linear(colors.reshape(-1, 3))).astype(np.uint8)
 
 
-def _on_plane(
+def _intersect_plane(
     origin: tuple[float, float, float], direction: tuple[float, float, float], height: float
 ) -> tuple[float, float, float] | None:
     """Where a ray meets the horizontal plane at `height`; None where it never does."""

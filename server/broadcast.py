@@ -12,23 +12,23 @@ from labs.engine.run import World
 from labs.plots import field_names, label_names
 from server.messages import Hello, Status, Telemetry, View
 from server.pacing import MEASURE_EVERY, Pacer
-from server.pipe import HELLO, STATUS, STREAM, Link
+from server.pipe import HELLO, STATUS, STREAM, WorkerPipe
 from server.solver_clock import SolverClock
 from server.viser_scene import ViserScene
 
-FRAME = 1 / 60
+FRAME_PERIOD = 1 / 60
 """[s] The loop's beat, and the scene's; on a machine that is late, the scene's is twice that."""
-LATE = 0.001
+LATE_THRESHOLD = 0.001
 """[s] Waking up later than this, on average, means that the machine is busy."""
-TELEMETRY = 1 / 30
-FIELDS = 1 / 5
+TELEMETRY_PERIOD = 1 / 30
+FIELDS_PERIOD = 1 / 5
 STATUS_EVERY = MEASURE_EVERY
 SOLVER_EVERY = 0.1
 """[s] As long as the solver comes on, its status is sent as often."""
 
 
 @dataclass
-class Controls:
+class SessionControls:
     """What the user has chosen besides the world's parameters, and who watches."""
 
     world: World
@@ -39,7 +39,7 @@ class Controls:
     """A defect of the lab, in a sentence; empty while there is none."""
 
     @property
-    def moving(self) -> bool:
+    def time_advances(self) -> bool:
         """Whether simulated time goes on."""
         stopped = self.world.trouble or self.failure
         return self.running and self.world.lab.has_world() and not stopped
@@ -49,7 +49,12 @@ class Broadcast:
     """Sends what is due."""
 
     def __init__(
-        self, link: Link, scene: ViserScene, controls: Controls, pacer: Pacer, solver: SolverClock
+        self,
+        link: WorkerPipe,
+        scene: ViserScene,
+        controls: SessionControls,
+        pacer: Pacer,
+        solver: SolverClock,
     ) -> None:
         self._link, self._scene, self._controls = link, scene, controls
         self._pacer, self._solver = pacer, solver
@@ -76,11 +81,11 @@ class Broadcast:
     def next_wake(self, now: float) -> float:
         """The next frame; after a change already the next step, so that its effect shows soon."""
         frame = min(self._due["scene"], self._due["status"])
-        if self._urgent and self._controls.moving:
-            frame = min(frame, self._pacer.next_step(now))
+        if self._urgent and self._controls.time_advances:
+            frame = min(frame, self._pacer.next_step_time(now))
         return max(frame, now)
 
-    def note_wake(self, late: float) -> None:
+    def record_lateness(self, late: float) -> None:
         """The loop woke up so many seconds after it had wished to."""
         self._lateness += 0.02 * (max(0.0, late) - self._lateness)
 
@@ -90,16 +95,16 @@ class Broadcast:
             self._sent_run, self._sent_rows = self._world.runs, 0
             self._urgent, self._rows_before = True, 0
             self.send_hello()
-        fresh = self._world.recorder.count > self._rows_before or not self._controls.moving
+        fresh = self._world.recorder.count > self._rows_before or not self._controls.time_advances
         if self._urgent and fresh:
             self._due["telemetry"] = self._due["fields"] = self._due["scene"] = 0.0
             self._urgent = False
-        if self._is_due("telemetry", now, TELEMETRY):
+        if self._is_due("telemetry", now, TELEMETRY_PERIOD):
             self._send_telemetry(now)
 
     def draw(self, now: float) -> None:
         """The scene, if it is due."""
-        frame = FRAME if self._lateness < LATE else 2 * FRAME
+        frame = FRAME_PERIOD if self._lateness < LATE_THRESHOLD else 2 * FRAME_PERIOD
         if self._is_due("scene", now, frame) and not self._controls.failure:
             self._scene.draw(self._world)
 
@@ -119,7 +124,7 @@ class Broadcast:
     def send_status(self, now: float) -> None:
         """The state of the session as it is."""
         world, controls, speed = self._world, self._controls, self._pacer.speed
-        measured = self._pacer.measure(now) if controls.moving else 0.0
+        measured = self._pacer.real_time_factor(now) if controls.time_advances else 0.0
         status = Status(
             run=world.runs,
             t=world.t,
@@ -128,8 +133,8 @@ class Broadcast:
             running=controls.running,
             speed=speed,
             real_time_factor=speed if measured is None else measured,
-            step_seconds=self._pacer.take_step_seconds(),
-            capped=controls.moving and measured is not None and measured < 0.95 * speed,
+            step_seconds=self._pacer.pop_step_seconds(),
+            capped=controls.time_advances and measured is not None and measured < 0.95 * speed,
             trouble=controls.failure or world.trouble,
             solver=self._solver.status(),
             view=controls.view,
@@ -150,10 +155,10 @@ class Broadcast:
         self._sent_rows = world.recorder.count
         fields = None
         wanted = controls.viewers and self._fields and not controls.failure
-        if wanted and self._is_due("fields", now, FIELDS):
+        if wanted and self._is_due("fields", now, FIELDS_PERIOD):
             known = named_values(world)
             fields = {name: known[name] for name in self._fields if name in known}
-        if len(rows) and controls.moving:
+        if len(rows) and controls.time_advances:
             self._measured = world.state, world.params
         # A world that has come to a halt was perhaps changed after its last row.
         now_row = self._current_row()

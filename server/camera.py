@@ -10,44 +10,44 @@ import numpy as np
 import viser
 from numpy.typing import ArrayLike
 
-from server.framing import FOV, NARROW, Window, camera_axes, extremes, nearest
+from server.framing import FOV, NARROW_ASPECT, Window, camera_axes, nearest_camera, side_extremes
 
-ROOM = 1.0
+BOUNDS_MARGIN = 1.0
 """What moves is followed to so many times the size of what was there when something new was drawn:
 what runs away does not shrink the rest."""
-GLIDE = 0.12
+SMOOTHING = 0.12
 """The part of the way to its place that the camera goes in a frame."""
-MEMORY = 2.5
+MEMORY_SECONDS = 2.5
 """[s] for which what was in view keeps its place, and up to twice as long."""
-WORTH_IT = 0.75
+ZOOM_IN_RATIO = 0.75
 """The camera comes nearer again if it can, to this part of its distance."""
-ELSEWHERE = 0.1
+JUMP_DISTANCE = 0.1
 """Where something new is drawn, or a run begins, it forgets what was if it fits better from a place
 that is so far away, in parts of its distance."""
-SAME = 2e-3
+POSE_TOLERANCE = 2e-3
 """Poses that differ by less, in parts of the distance, are one."""
-CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) / np.sqrt(3.0)
+BALL_CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3))) / np.sqrt(3.0)
 """(8, 3) of a ball of radius 1."""
-NOTHING = np.empty((0, 3))
-CHARACTER, LINE = 3.6, 18.0
+NO_POINTS = np.empty((0, 3))
+HALF_CHARACTER_WIDTH, LINE_HEIGHT = 3.6, 18.0
 """[px] half the width of a character of a label, and the height of its line."""
 
 
 @dataclass(frozen=True)
-class Drawn:
+class FrameContents:
     """What a frame shows: points (k, 3) [m], and labels as a point and the text's length each; and
     what a narrow window shows of it, (n, 3) [m], none for all."""
 
     points: np.ndarray
     labels: list[tuple[np.ndarray, int]]
-    core: np.ndarray = field(default_factory=lambda: NOTHING)
+    core: np.ndarray = field(default_factory=lambda: NO_POINTS)
 
-    def seen_by(self, window: Window) -> "Drawn":
+    def visible_in(self, window: Window) -> "FrameContents":
         """What is to be in view in a window."""
-        if not len(self.core) or window.aspect >= NARROW:
+        if not len(self.core) or window.aspect >= NARROW_ASPECT:
             return self
         low, high = self.core[:, :2].min(axis=0), self.core[:, :2].max(axis=0)
-        return Drawn(
+        return FrameContents(
             self.core, [(p, n) for p, n in self.labels if ((low <= p[:2]) & (p[:2] <= high)).all()]
         )
 
@@ -69,9 +69,9 @@ class Camera:
     def metres_per_pixel(self, point: np.ndarray) -> float:
         """At a point (3,) [m], wherever the camera is now."""
         away = float(np.linalg.norm(point - self._client.camera.position))
-        return self._window.pixel * away if self._window.height else 0.0
+        return self._window.pixel_tangent * away if self._window.height else 0.0
 
-    def release(self) -> None:
+    def reset(self) -> None:
         """Forgets that a hand has moved it, and begins anew."""
         self._at = None
 
@@ -82,9 +82,11 @@ class Camera:
             return None
         position, look_at = self._pose()
         local = (points - position) @ camera_axes(position, look_at).T
-        return np.asarray(local[:, :2] / np.maximum(local[:, 2:], 1e-3) / self._window.pixel)
+        return np.asarray(
+            local[:, :2] / np.maximum(local[:, 2:], 1e-3) / self._window.pixel_tangent
+        )
 
-    def follow(self, drawn: Drawn, home: np.ndarray, now: float, *, changed: bool) -> None:
+    def follow(self, drawn: FrameContents, home: np.ndarray, now: float, *, changed: bool) -> None:
         """Moves the camera to where all that is drawn, and was since the beginning, is in view, in
         the direction of `home`, (2, 3) [m]: a position and the point looked at. A viewer stands
         there at first, and when it resets its view by itself. `changed`: something else is drawn
@@ -93,7 +95,7 @@ class Camera:
         if min(camera.image_width, camera.image_height) < 2 or not len(drawn.points):
             return
         window = Window.of(camera.image_width, camera.image_height)
-        drawn = drawn.seen_by(window)
+        drawn = drawn.visible_in(window)
         # One that draws coarser for a while is not another window.
         resized = abs(window.aspect - self._window.aspect) > 0.02 * window.aspect
         window = self._window = window if resized else self._window
@@ -105,61 +107,64 @@ class Camera:
         elif self._at is not None and not any(map(self._is_at, reversed(self._poses))):
             return  # a hand has moved it
         begins = self._at is None
-        local = self._with_labels(drawn, self._axes)
+        local = self._add_label_boxes(drawn, self._axes)
         if begins or resized or changed:
             low, high = local.min(axis=0), local.max(axis=0)
-            room = ROOM * float((high - low).max())
+            room = BOUNDS_MARGIN * float((high - low).max())
             self._bounds = np.array([low - room, high + room])
-        reach = extremes(np.clip(local, *self._bounds), window)
+        reach = side_extremes(np.clip(local, *self._bounds), window)
         if changed and not begins:
-            begins = self._distance(reach) < WORTH_IT * self._distance(self._reach)
+            begins = self._distance(reach) < ZOOM_IN_RATIO * self._distance(self._reach)
         jumps = begins or resized
-        if jumps or (changed and self._is_elsewhere(reach, window)):
+        if jumps or (changed and self._is_far_from_best(reach, window)):
             self._reach = self._latest = self._before = reach
-            self._due = now + MEMORY
-        self._remember(reach, now)
-        goal = nearest(self._reach, window)
+            self._due = now + MEMORY_SECONDS
+        self._update_extremes(reach, now)
+        goal = nearest_camera(self._reach, window)
         if jumps or self._at is None:
             self._at = goal
-        elif np.linalg.norm(goal - self._at) < 0.5 * SAME * self._distance(self._reach):
+        elif np.linalg.norm(goal - self._at) < 0.5 * POSE_TOLERANCE * self._distance(self._reach):
             return
         else:
-            self._at = self._at + GLIDE * (goal - self._at)
-        self._move()
+            self._at = self._at + SMOOTHING * (goal - self._at)
+        self._apply_pose()
 
-    def _is_elsewhere(self, reach: np.ndarray, window: Window) -> bool:
+    def _is_far_from_best(self, reach: np.ndarray, window: Window) -> bool:
         """Whether this frame alone is seen best from another place than all that was."""
-        away = nearest(reach, window) - nearest(self._reach, window)
-        return float(np.linalg.norm(away)) > ELSEWHERE * self._distance(self._reach)
+        away = nearest_camera(reach, window) - nearest_camera(self._reach, window)
+        return float(np.linalg.norm(away)) > JUMP_DISTANCE * self._distance(self._reach)
 
-    def _remember(self, reach: np.ndarray, now: float) -> None:
+    def _update_extremes(self, reach: np.ndarray, now: float) -> None:
         """Extremes of this frame. A plan's first guesses may reach far, and never again."""
         self._reach = np.maximum(reach, self._reach)
         self._latest = np.maximum(reach, self._latest)
         if now > self._due:
-            self._due = now + MEMORY
+            self._due = now + MEMORY_SECONDS
             lately = np.maximum(self._latest, self._before)
-            if self._distance(lately) < WORTH_IT * self._distance(self._reach):
+            if self._distance(lately) < ZOOM_IN_RATIO * self._distance(self._reach):
                 self._reach = lately
             self._before, self._latest = self._latest, reach
 
     def _distance(self, reach: np.ndarray) -> float:
         """[m] from the camera to the middle of what is in view."""
-        return float(0.5 * (reach[5] - reach[4]) - nearest(reach, self._window)[2])
+        return float(0.5 * (reach[5] - reach[4]) - nearest_camera(reach, self._window)[2])
 
-    def _with_labels(self, drawn: Drawn, axes: np.ndarray) -> np.ndarray:
+    def _add_label_boxes(self, drawn: FrameContents, axes: np.ndarray) -> np.ndarray:
         """What is to be in view in the camera's axes; labels as wide as they will be about."""
         local = drawn.points @ axes.T
-        distance = self._distance(extremes(local, self._window))
+        distance = self._distance(side_extremes(local, self._window))
         boxes = [
-            axes @ point + distance * self._window.pixel * np.array([side * CHARACTER * n, up, 0.0])
+            axes @ point
+            + distance
+            * self._window.pixel_tangent
+            * np.array([side * HALF_CHARACTER_WIDTH * n, up, 0.0])
             for point, n in drawn.labels
             for side in (-1.0, 1.0)
-            for up in (-LINE, LINE)
+            for up in (-LINE_HEIGHT, LINE_HEIGHT)
         ]
         return np.concatenate([local, boxes]) if boxes else local
 
-    def _move(self) -> None:
+    def _apply_pose(self) -> None:
         assert self._at is not None
         middle = 0.5 * (self._reach[5] - self._reach[4])
         ahead = np.array([0.0, 0.0, middle - self._at[2]])
@@ -174,7 +179,7 @@ class Camera:
 
     def _is_at(self, pose: np.ndarray) -> bool:
         """Whether the viewer stands at a pose (2, 3) [m]."""
-        near = SAME * float(np.linalg.norm(pose[0] - pose[1]))
+        near = POSE_TOLERANCE * float(np.linalg.norm(pose[0] - pose[1]))
         return bool(np.abs(self._pose() - pose).max() < near)
 
 
@@ -185,15 +190,15 @@ class Cameras:
         self._server = server
         self._cameras: dict[int, Camera] = {}
         self._home = np.array([[3.0, 3.0, 3.0], [0.0, 0.0, 0.0]])
-        self._core = NOTHING
+        self._core = NO_POINTS
         self._points: list[np.ndarray] = []
         self._solid: list[np.ndarray] = []
         self._labels: list[tuple[np.ndarray, int]] = []
-        self.solid = NOTHING
+        self.solid = NO_POINTS
         """(k, 3) [m]: the solid points of the last frame."""
         server.initial_camera.fov = FOV
 
-    def look(self, position: ArrayLike, look_at: ArrayLike, core: ArrayLike = ()) -> None:
+    def set_home_view(self, position: ArrayLike, look_at: ArrayLike, core: ArrayLike = ()) -> None:
         """From where a lab wants to be looked at: two (3,) points [m]; and what of it a narrow
         window shows, (..., 3) [m], none for all."""
         self._core = np.asarray(core, float).reshape(-1, 3)
@@ -202,31 +207,31 @@ class Cameras:
             self._home = home
             self._server.initial_camera.position, self._server.initial_camera.look_at = home
 
-    def see(self, points: np.ndarray) -> None:
+    def include_points(self, points: np.ndarray) -> None:
         """Points (..., 3) [m] of this frame that are to be in view."""
         self._points.append(points.reshape(-1, 3))
 
-    def see_ball(self, center: ArrayLike, radius: float) -> None:
+    def include_ball(self, center: ArrayLike, radius: float) -> None:
         """A ball: center (3,) [m], radius [m]."""
-        self._points.append(np.asarray(center, float) + radius * CORNERS)
+        self._points.append(np.asarray(center, float) + radius * BALL_CORNERS)
 
-    def avoid(self, points: np.ndarray) -> None:
+    def add_obstacles(self, points: np.ndarray) -> None:
         """Points (k, 3) [m] on what a label had better not hide."""
         self._solid.append(points)
 
-    def see_label(self, point: np.ndarray, text: str) -> None:
+    def include_label(self, point: np.ndarray, text: str) -> None:
         """A label at a point (3,) [m]."""
         self._labels.append((point, len(text)))
 
-    def release(self) -> None:
+    def reset(self) -> None:
         """Every camera begins anew, whoever has moved it."""
         for camera in self._cameras.values():
-            camera.release()
+            camera.reset()
 
     def follow(self, *, changed: bool, held: bool = False) -> None:
         """Places the cameras for what was seen since the last call; not while a hand has `held` of
         something, which would slip away under it."""
-        drawn = Drawn(np.concatenate(self._points or [NOTHING]), self._labels, self._core)
+        drawn = FrameContents(np.concatenate(self._points or [NO_POINTS]), self._labels, self._core)
         self.solid = np.concatenate(self._solid or [self.solid[:0]])
         self._points, self._solid, self._labels = [], [], []
         now = time.monotonic()

@@ -7,13 +7,13 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from labs.engine.catalog import catalog, find
-from labs.engine.events import Event, events_of, parse_event
-from labs.engine.headless import run
+from labs.engine.catalog import catalog, find_lab
+from labs.engine.events import Event, events_from_recording, parse_event
+from labs.engine.headless import run_headless
 from labs.engine.plot_data import PlotData
 from labs.engine.record import versions
 from labs.engine.run import World
-from labs.engine.solution import FORMS as SOLUTION_FORMS
+from labs.engine.solution import FILE_FORMATS as SOLUTION_FORMS
 from labs.engine.solution import Solution
 from labs.errors import LabError
 
@@ -44,9 +44,9 @@ def _parser() -> argparse.ArgumentParser:
         prog="orclab", description="An interactive lab for optimization-based robot control."
     )
     parser.add_argument("--version", action="version", version=versions()["orclab"])
-    _serving(parser)
+    _add_serve_options(parser)
     commands = parser.add_subparsers(dest="command", metavar="{serve,list,run}")
-    _serving(commands.add_parser("serve", help="serve the labs (what orclab alone does)"))
+    _add_serve_options(commands.add_parser("serve", help="serve the labs (what orclab alone does)"))
     commands.add_parser("list", help="list the labs")
     runner = commands.add_parser(
         "run",
@@ -84,10 +84,10 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _serving(parser: argparse.ArgumentParser) -> None:
+def _add_serve_options(parser: argparse.ArgumentParser) -> None:
     for flag, kind, help in (
         ("--host", str, "address to listen on (127.0.0.1)"),
-        ("--port", _port, "port to listen on (8000; 0: any free one)"),
+        ("--port", _parse_port, "port to listen on (8000; 0: any free one)"),
     ):
         parser.add_argument(flag, type=kind, default=argparse.SUPPRESS, help=help)
     parser.add_argument(
@@ -120,11 +120,11 @@ def _run(options: argparse.Namespace) -> int:
     plan = _arguments_of_recording(options) if options.replay else _arguments_of_options(options)
     if options.seconds is not None:
         plan["seconds"] = options.seconds
-    from labs.compiled import NOTE  # on demand: help needs no Numba
+    from labs.compiled import CACHE_NOTE  # on demand: help needs no Numba
 
-    if NOTE:
-        print(NOTE, file=sys.stderr)
-    world = run(**plan, progress=_progress if sys.stderr.isatty() else None)
+    if CACHE_NOTE:
+        print(CACHE_NOTE, file=sys.stderr)
+    world = run_headless(**plan, progress=_progress if sys.stderr.isatty() else None)
     for option, path, write in outputs:
         try:
             path.write_bytes(write(world, path.suffix[1:]))
@@ -160,18 +160,18 @@ def _check_output(option: str, path: Path, forms: Sequence[str]) -> None:
 def _arguments_of_options(options: argparse.Namespace) -> dict[str, Any]:
     if options.lab is None:
         raise LabError(f"say which lab to run: {', '.join(catalog())}")
-    entry = find(options.lab)
+    entry = find_lab(options.lab)
     texts = dict(_parse_assignment(text) for text in options.set)
     return {
         "slug": options.lab,
         "changes": entry.lab.Params.read(texts),
-        "seed": _seed(options.seed),
+        "seed": _check_seed(options.seed),
         "events": [parse_event(entry, at, what) for at, what in options.at],
-        "solution": _solution(options.solution) if options.solution else None,
+        "solution": _read_solution(options.solution) if options.solution else None,
     }
 
 
-def _solution(path: Path) -> Solution:
+def _read_solution(path: Path) -> Solution:
     try:
         return Solution.read(path.read_bytes())
     except OSError as error:
@@ -186,11 +186,11 @@ def _arguments_of_recording(options: argparse.Namespace) -> dict[str, Any]:
         raise LabError("--replay takes the lab, its parameters, changes and seed from the file")
     try:
         about = json.loads(path.read_bytes())
-        events: list[Event] = events_of(about)
+        events: list[Event] = events_from_recording(about)
         return {
             "slug": str(about["lab"]),
             "changes": dict(about["params"]),
-            "seed": _seed(int(about["seed"])),
+            "seed": _check_seed(int(about["seed"])),
             "seconds": float(about["covers"]["to"]),
             "events": events,
             "solution": Solution.from_dict(about["solution"]) if "solution" in about else None,
@@ -208,13 +208,13 @@ def _arguments_of_recording(options: argparse.Namespace) -> dict[str, Any]:
         raise LabError(f"--replay {path}: not a JSON export of orclab ({error!r})") from None
 
 
-def _port(text: str) -> int:
+def _parse_port(text: str) -> int:
     if not text.isdecimal() or int(text) > 65535:
         raise argparse.ArgumentTypeError(f"{text}: takes a whole number from 0 to 65535")
     return int(text)
 
 
-def _seed(seed: int | None) -> int | None:
+def _check_seed(seed: int | None) -> int | None:
     if seed is not None and not 0 <= seed < 2**32:
         raise LabError(f"seed {seed}: takes a whole number from 0 to {2**32 - 1}")
     return seed

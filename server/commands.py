@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from server.messages import Changes, Finite, Message, View
+from server.messages import Changes, FiniteFloat, Message, View
 from server.session import Session
 
 
@@ -37,7 +37,7 @@ class Speed(Message):
     """Simulated seconds per second of the wall clock."""
 
     command: Literal["speed"]
-    factor: Annotated[Finite, Field(ge=0.1, le=4.0)]
+    factor: Annotated[FiniteFloat, Field(ge=0.1, le=4.0)]
 
 
 class Seed(Message):
@@ -52,7 +52,7 @@ class Compare(Message):
 
     params: Changes
     """As of `Apply`: all others have their defaults."""
-    seconds: Annotated[Finite, Field(gt=0.0, le=120.0)]
+    seconds: Annotated[FiniteFloat, Field(gt=0.0, le=120.0)]
     """How far it goes."""
 
 
@@ -64,11 +64,11 @@ class Apply(Message):
     command: Literal["apply"]
     params: Changes = Field(default_factory=dict)
     restart: bool = True
-    speed: Annotated[Finite, Field(ge=0.1, le=4.0)] | None = None
+    speed: Annotated[FiniteFloat, Field(ge=0.1, le=4.0)] | None = None
     """As of `Speed`."""
-    pace: Annotated[Finite, Field(ge=0.0, le=1000.0)] | None = None
+    pace: Annotated[FiniteFloat, Field(ge=0.0, le=1000.0)] | None = None
     """As of `SolverPace`."""
-    hold: Annotated[Finite, Field(gt=0.0)] | None = None
+    hold: Annotated[FiniteFloat, Field(gt=0.0)] | None = None
     """[s] When this run pauses, once: a restart forgets it."""
     compare: Compare | None = None
 
@@ -123,7 +123,7 @@ class SolverPace(Message):
     """Iterations per second at most; 0 for as many as go. It changes no result."""
 
     command: Literal["solver_pace"]
-    pace: Annotated[Finite, Field(ge=0.0, le=1000.0)]
+    pace: Annotated[FiniteFloat, Field(ge=0.0, le=1000.0)]
 
 
 WorldCommand = Run | Pause | Step | Reset | Speed | Seed | Apply | Press | SetView | ResetView

@@ -59,14 +59,14 @@ from labs.params import Knob, Params, Value
 from labs.plots import Readout
 from server import predictions
 from server import toml_values as toml
-from server.formulas import ArticleError, tex
+from server.formulas import ArticleError, tex_to_mathml
 from server.predictions import Prediction, find_readout
 
 PACES = (0, 30, 10, 5, 2, 1)
 """What the page's menu has: iterations of the solver a second; 0 for as many as go."""
 WINDOWS = (5, 10, 30, 0)
 """[s] What the page's menu has; 0 for all."""
-LONGEST = 120.0
+MAX_SECONDS = 120.0
 """[s] As much of a run a page keeps."""
 WATCHED = 2
 """Plots that fit on a laptop's screen."""
@@ -95,7 +95,7 @@ class Experiment:
     @property
     def seconds(self) -> float:
         """[s] How far the run compared with goes, and a sketch."""
-        return self.hold or self.window or LONGEST
+        return self.hold or self.window or MAX_SECONDS
 
     def describe(self) -> dict[str, Any]:
         """What the page's scripts need, as plain JSON data."""
@@ -117,7 +117,7 @@ class Experiment:
         }
 
 
-def read(entry: CatalogEntry, source: str, html: Callable[[str], str]) -> Experiment:
+def read_experiment(entry: CatalogEntry, source: str, html: Callable[[str], str]) -> Experiment:
     """The experiment that a block's TOML describes; `html` renders its Markdown. Raises
     ArticleError."""
     try:
@@ -154,18 +154,18 @@ class _ExperimentReader:
             button,
             self._watch(data.get("watch", [])),
             self._highlight(data),
-            toml.number(data, "window", 0.0, LONGEST, 10.0),
+            toml.number(data, "window", 0.0, MAX_SECONDS, 10.0),
             self._hold(data),
             toml.number(data, "speed", 0.1, 4.0, 1.0),
             self._pace(data),
             settings,
             compare,
-            _compared(self.lab.Params().change(settings), compare),
+            _describe_comparison(self.lab.Params().change(settings), compare),
         )
         if "predict" not in data:
             return experiment
         table = toml.table(data, "predict")
-        predict = predictions.read(self.lab, table, experiment.watch, self.html)
+        predict = predictions.read_prediction(self.lab, table, experiment.watch, self.html)
         return Experiment(**vars(experiment) | {"predict": predict})
 
     def _watch(self, given: object) -> tuple[str, ...]:
@@ -188,7 +188,7 @@ class _ExperimentReader:
             return None
         if not self.lab.has_world():
             raise ArticleError("hold is for labs in which time runs")
-        return toml.number(data, "hold", self.lab.period, LONGEST)
+        return toml.number(data, "hold", self.lab.period, MAX_SECONDS)
 
     def _pace(self, data: Mapping[str, Any]) -> float:
         pace = toml.number(data, "pace", 0.0, max(PACES), 0.0)
@@ -199,7 +199,7 @@ class _ExperimentReader:
         return pace
 
 
-def _compared(params: Params, compare: Mapping[str, Value]) -> str:
+def _describe_comparison(params: Params, compare: Mapping[str, Value]) -> str:
     """What is otherwise, as HTML: k_p = 400 N/m, in symbols where there are some."""
     described = {tunable["name"]: tunable for tunable in params.describe()}
     values = params.model_dump() | dict(compare)
@@ -212,12 +212,12 @@ def _compared(params: Params, compare: Mapping[str, Value]) -> str:
         knob = params.tunables[name]
         unit = knob.unit_under(values) if isinstance(knob, Knob) else ""
         unit = f" {unit}" if unit else ""
-        named = tex(symbol) if symbol else escape(tunable["label"])
+        named = tex_to_mathml(symbol) if symbol else escape(tunable["label"])
         parts.append(f"{named} = {escape(shown + unit)}")
     return ", ".join(parts)
 
 
-def card(experiment: Experiment, number: int) -> str:
+def render_card(experiment: Experiment, number: int) -> str:
     """The card of an experiment. Before the button is pressed it asks; then it tells."""
     compared = experiment.compared and f'<p class="compared">Faint: {experiment.compared}</p>\n'
     return f"""<section class="experiment" id="experiment-{number}" data-experiment="{number - 1}"
@@ -225,7 +225,7 @@ def card(experiment: Experiment, number: int) -> str:
 <header><span class="number" aria-hidden="true">{number}</span>
 <h3 id="experiment-{number}-title">{escape(experiment.title)}</h3></header>
 <div class="question">{experiment.question}</div>
-{predictions.form(experiment.predict, number)}
+{predictions.prediction_form(experiment.predict, number)}
 <button type="button" class="primary try">{escape(experiment.button)}</button>
 <p class="verdict" role="status" hidden></p>
 <details><summary>What to look for</summary>

@@ -12,7 +12,7 @@ from multiprocessing.context import ForkServerContext
 PRELOADED = "server.preload"
 
 
-def context() -> ForkServerContext:
+def fork_context() -> ForkServerContext:
     """What starts processes there."""
     # Inherited by the fork server: threads hurt at these sizes.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -21,13 +21,13 @@ def context() -> ForkServerContext:
     return found
 
 
-def start() -> None:
+def start_fork_server() -> None:
     """Begins to load, and does not wait."""
-    context()
+    fork_context()
     multiprocessing.forkserver.ensure_running()
 
 
-def endure_broken_requests() -> None:
+def tolerate_broken_requests() -> None:
     """To be called in the fork server. A client that is out of descriptors connects and hangs up
     before it has asked; the loop of the standard library (up to 3.13) ends of that, and with it
     every worker. It does go on after a connection that was aborted, so that is what it is told."""

@@ -15,7 +15,7 @@ class ArticleError(LabError):
 
 
 @lru_cache(maxsize=1024)
-def tex(source: str, display: bool = False) -> str:
+def tex_to_mathml(source: str, display: bool = False) -> str:
     """MathML of a TeX formula. Raises ArticleError."""
     try:
         return _math.convert_with_local_state(source, displaystyle=display)

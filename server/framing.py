@@ -18,9 +18,9 @@ FOV = np.radians(35.0)
 PANEL, BUTTONS, SHEET, MARGIN = 46, 24, 44, 12
 """[px] that the folded panel takes on the right, the buttons at the bottom, both at the bottom of a
 narrow window, and air around."""
-NARROW, UPRIGHT = 1.5, 300
+NARROW_ASPECT, NARROW_HEIGHT = 1.5, 300
 """Width over height of a narrow window, a phone's, and its height [px]."""
-LOWEST, HIGHEST = 270, 450
+MIN_HEIGHT, MAX_HEIGHT = 270, 450
 """[px] A viewer tells the size of what it draws on, which may be finer than its screen, or coarser
 where it draws slowly: heights beyond these are not believed."""
 
@@ -36,22 +36,25 @@ class Window:
     def of(cls, width: int, height: int) -> "Window":
         """As a viewer tells it."""
         aspect = width / height
-        return cls(aspect, UPRIGHT if aspect < NARROW else min(max(height, LOWEST), HIGHEST))
+        return cls(
+            aspect,
+            NARROW_HEIGHT if aspect < NARROW_ASPECT else min(max(height, MIN_HEIGHT), MAX_HEIGHT),
+        )
 
     @property
-    def pixel(self) -> float:
+    def pixel_tangent(self) -> float:
         """The tangent of one pixel: how wide it is [m] a metre away."""
         return float(2.0 * np.tan(FOV / 2)) / self.height
 
     @property
     def tangents(self) -> np.ndarray:
         """(4,): of the free part: right, left, top, bottom."""
-        taken = (0, 0, 0, SHEET) if self.aspect < NARROW else (PANEL, 0, 0, BUTTONS)
+        taken = (0, 0, 0, SHEET) if self.aspect < NARROW_ASPECT else (PANEL, 0, 0, BUTTONS)
         half = 0.5 * self.height * np.array([self.aspect, self.aspect, 1.0, 1.0])
-        return np.asarray(self.pixel * (half - taken - MARGIN))
+        return np.asarray(self.pixel_tangent * (half - taken - MARGIN))
 
 
-def extremes(points: np.ndarray, window: Window) -> np.ndarray:
+def side_extremes(points: np.ndarray, window: Window) -> np.ndarray:
     """(6,): the largest x - r z, -x - l z, y - t z, -y - b z, -z and z of points (k, 3) in the
     camera's axes."""
     x, y, z = points.T
@@ -60,7 +63,7 @@ def extremes(points: np.ndarray, window: Window) -> np.ndarray:
     return np.array([side.max() for side in sides])
 
 
-def nearest(reach: np.ndarray, window: Window) -> np.ndarray:
+def nearest_camera(reach: np.ndarray, window: Window) -> np.ndarray:
     """(3,): the nearest camera, in its own axes, that has all of these extremes in its window."""
     right, left, top, bottom = window.tangents
     z = min(

@@ -11,9 +11,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from server.settings import Settings
 
 LOOPBACK = {"127.0.0.1", "localhost", "::1"}
-SAFE = {"GET", "HEAD", "OPTIONS"}
-BEGINNINGS = ("http.response.start", "websocket.accept", "websocket.http.response.start")
-HEADERS = {
+SAFE_METHODS = {"GET", "HEAD", "OPTIONS"}
+START_MESSAGES = ("http.response.start", "websocket.accept", "websocket.http.response.start")
+SECURITY_HEADERS = {
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "same-origin",
     # Of what is no page: it loads nothing, should somebody open it as one.
@@ -41,16 +41,16 @@ class Guard:
             return
         headers = {k.decode("latin-1"): v.decode("latin-1") for k, v in scope["headers"]}
         refusal = self._refusal(scope, headers)
-        sending = _answering(scope, receive, send)
+        sending = _add_headers(scope, receive, send)
         if refusal is None:
-            inside = self._inside(scope)
-            await self._app(inside, _bounded(receive, self._limit(inside)), sending)
+            inside = self._inner_scope(scope)
+            await self._app(inside, _limit_body(receive, self._body_limit(inside)), sending)
         else:
             status, sentence, code = refusal
             response = JSONResponse({"error": sentence, "code": code}, status)
             await response(scope, receive, sending)
 
-    def _inside(self, scope: Scope) -> Scope:
+    def _inner_scope(self, scope: Scope) -> Scope:
         """As the application sees it: without the prefix, which some proxies take away and others
         leave there; and a HEAD as the GET whose body uvicorn keeps back."""
         path, raw = scope["path"], scope.get("raw_path") or b""
@@ -68,30 +68,30 @@ class Guard:
             sentence += "ORCLAB_ORIGINS names the address it has there"
             return 403, sentence, "wrong-host"
         origin = headers.get("origin")
-        changes = scope["type"] == "websocket" or scope["method"] not in SAFE
-        if origin and changes and not self._allowed(origin, host):
+        changes = scope["type"] == "websocket" or scope["method"] not in SAFE_METHODS
+        if origin and changes and not self._is_allowed_origin(origin, host):
             sentence = f"pages of {origin[:80]!r} may not use this server, unless ORCLAB_ORIGINS "
             return 403, sentence + "names them", "wrong-origin"
         length = headers.get("content-length", "0")
         bounded = length.isascii() and length.isdecimal() and len(length) < 16
-        if not bounded or int(length) > self._limit(scope):
-            return 413, _too_large(self._limit(scope)), "too-large"
+        if not bounded or int(length) > self._body_limit(scope):
+            return 413, _too_large(self._body_limit(scope)), "too-large"
         return None
 
-    def _limit(self, scope: Scope) -> int:
+    def _body_limit(self, scope: Scope) -> int:
         """[bytes] Of a body: a solution may be larger than all else."""
         usual, solution = self._limits
         is_solution = scope.get("method") == "PUT" and scope["path"].endswith("/solution")
         return solution if is_solution else usual
 
-    def _allowed(self, origin: str, host: str) -> bool:
+    def _is_allowed_origin(self, origin: str, host: str) -> bool:
         try:
             return origin in self._origins or urlsplit(origin).netloc == host
         except ValueError:  # http://[
             return False
 
 
-def _answering(scope: Scope, receive: Receive, send: Send) -> Send:
+def _add_headers(scope: Scope, receive: Receive, send: Send) -> Send:
     """Sends with our headers, and says why a WebSocket is closed that was not yet open."""
     is_open = scope["type"] != "websocket"
 
@@ -102,10 +102,10 @@ def _answering(scope: Scope, receive: Receive, send: Send) -> Send:
             refusal = JSONResponse({"error": why, "code": "no-websocket"}, 403)
             await refusal(scope, receive, sending)
             return
-        if message["type"] in BEGINNINGS:
+        if message["type"] in START_MESSAGES:
             is_open = True
             headers = MutableHeaders(scope={"headers": message.get("headers", [])})
-            for name, value in HEADERS.items():
+            for name, value in SECURITY_HEADERS.items():
                 headers.setdefault(name, value)
             message = {**message, "headers": headers.raw}
         await send(message)
@@ -113,7 +113,7 @@ def _answering(scope: Scope, receive: Receive, send: Send) -> Send:
     return sending
 
 
-def _bounded(receive: Receive, limit: int) -> Receive:
+def _limit_body(receive: Receive, limit: int) -> Receive:
     read = 0
 
     async def bounded() -> Message:

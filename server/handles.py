@@ -8,7 +8,7 @@ import viser
 from server.mailbox import Mailbox
 from server.nodes import COLORS, Node
 
-SMALLEST = 15.0
+MIN_RADIUS = 15.0
 """[px] radius on any screen."""
 STEP = 1.15
 """A ball grows by this factor at a time: it is sent seldom."""
@@ -39,10 +39,10 @@ class HandleNode(Node):
         super().__init__(ball)
         self._core, self._radius = Node(core), radius
 
-    def keep_reachable(self, metres_per_pixel: float) -> float:
+    def scale_to_screen(self, metres_per_pixel: float) -> float:
         """Never smaller than a hand can hit. Its radius [m] now."""
-        wanted = max(1.0, SMALLEST * metres_per_pixel / self._radius)
+        wanted = max(1.0, MIN_RADIUS * metres_per_pixel / self._radius)
         scale = STEP ** math.ceil(math.log(wanted, STEP))
-        self.send("scale", scale)
-        self._core.send("scale", scale)
+        self.set_property("scale", scale)
+        self._core.set_property("scale", scale)
         return self._radius * scale

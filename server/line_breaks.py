@@ -12,16 +12,16 @@ def _set(tokens: str) -> frozenset[str]:
 
 
 RELATIONS = _set(r"=<>\le\ge\leq\geq\ll\gg\approx\Rightarrow\iff\leftarrow\succ\succeq")
-SUMS, SPACES, BARS = _set("+-"), _set(r"\quad\qquad"), _set(r"|\|")
+SIGNS, SPACES, BARS = _set("+-"), _set(r"\quad\qquad"), _set(r"|\|")
 OPENING, CLOSING = _set(r"([{\{\lVert\lvert\begin"), _set(r")]}\}\rVert\rvert\end")
 
 
-def statements(source: str) -> list[list[str]]:
+def split_statements(source: str) -> list[list[str]]:
     """The statements of a TeX formula, which `\\quad` or `\\qquad` part, each as pieces that begin
     with a relation or a sign: `a = b + c \\quad d = e` is `[["a", "= b", "+ c"], ["d", "= e"]]`.
     What stands in brackets, bars or an environment stays whole."""
     found: list[list[str]] = [[""]]
-    for token, where in _tokens(source):
+    for token, where in _classify_tokens(source):
         if where == "statement":
             found.append([""])
         elif where == "piece" and found[-1][-1].strip():
@@ -32,7 +32,7 @@ def statements(source: str) -> list[list[str]]:
     return [[piece.strip() for piece in pieces] for pieces in found if "".join(pieces).strip()]
 
 
-def _tokens(source: str) -> Iterator[tuple[str, str]]:
+def _classify_tokens(source: str) -> Iterator[tuple[str, str]]:
     """Every token, with what begins at it: "statement", "piece" or nothing."""
     open_: list[str] = []
     before = ""
@@ -57,5 +57,5 @@ def _tokens(source: str) -> Iterator[tuple[str, str]]:
 def _begins_piece(token: str, before: str) -> bool:
     if token in RELATIONS:
         return before not in ("", "^", "_")
-    ends_term = before not in RELATIONS | SUMS and before not in ("", "^", "_", ",")
-    return token in SUMS and ends_term
+    ends_term = before not in RELATIONS | SIGNS and before not in ("", "^", "_", ",")
+    return token in SIGNS and ends_term

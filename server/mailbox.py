@@ -7,7 +7,7 @@ from typing import Any
 
 
 @dataclass
-class Item:
+class WorkItem:
     """One thing to do."""
 
     do: str
@@ -21,7 +21,7 @@ class Mailbox:
     Neighbouring changes of parameters, and of a held handle, merge: the latest wins."""
 
     def __init__(self) -> None:
-        self._items: deque[Item] = deque()
+        self._items: deque[WorkItem] = deque()
         self._arrived = threading.Condition()
 
     def put(self, do: str, ref: int | None = None, **arguments: Any) -> None:
@@ -32,13 +32,13 @@ class Mailbox:
                 if do == "params":
                     last.arguments["changes"] |= arguments["changes"]
                     return
-                if do == "hold" and _still_held(last.arguments, arguments):
+                if do == "hold" and _is_same_drag(last.arguments, arguments):
                     last.arguments["point"] = arguments["point"]
                     return
-            self._items.append(Item(do, ref, arguments))
+            self._items.append(WorkItem(do, ref, arguments))
             self._arrived.notify()
 
-    def take(self, timeout: float) -> list[Item]:
+    def take(self, timeout: float) -> list[WorkItem]:
         """All that waits; sleeps up to `timeout` seconds for the first to come."""
         with self._arrived:
             if not self._items and timeout > 0:
@@ -48,7 +48,7 @@ class Mailbox:
             return items
 
 
-def _still_held(before: dict[str, Any], after: dict[str, Any]) -> bool:
+def _is_same_drag(before: dict[str, Any], after: dict[str, Any]) -> bool:
     """Whether a handle is dragged on. Its release stays apart: a click is both in a moment."""
     held = before["point"] is not None and after["point"] is not None
     return held and bool(before["handle"] == after["handle"])

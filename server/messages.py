@@ -15,7 +15,7 @@ from labs.params import Value
 
 Changes = Annotated[dict[Annotated[str, Field(max_length=64)], Value], Field(max_length=100)]
 LinkTexts = Annotated[dict[Annotated[str, Field(max_length=64)], str], Field(max_length=100)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+FiniteFloat = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Message(BaseModel):
@@ -85,7 +85,7 @@ class Health(Message):
     """Whether the first worker is still awaited, while all is loaded and compiled."""
 
 
-class Problem(Message):
+class ErrorBody(Message):
     """What every refused request answers."""
 
     error: str
@@ -136,7 +136,7 @@ class Telemetry:
 
 
 @dataclass(frozen=True)
-class Compared:
+class ComparedRun:
     """The run that an experiment compares with, made before its own."""
 
     run: int

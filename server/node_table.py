@@ -30,10 +30,10 @@ class NodeTable:
         self._drawn[name] = None
         return node
 
-    def show_drawn(self) -> list[Node]:
+    def end_frame(self) -> list[Node]:
         """Ends a frame: hides what it did not ask for. Those it did, in that order."""
         for name, node in self._nodes.items():
-            node.show(name in self._drawn)
+            node.set_visible(name in self._drawn)
         drawn = [self._nodes[name] for name in self._drawn]
         self._drawn.clear()
         return drawn

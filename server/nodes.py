@@ -24,7 +24,7 @@ AMBER = (245, 166, 35)
 GHOST_OPACITY = 0.3
 GHOST_SCALE = 0.95
 """A ghost is a little thinner: where the arm is on its reference, it hides the ghost."""
-STILL = 2e-5
+POSE_TOLERANCE = 2e-5
 """A pose entry that moved less [m, or of a unit quaternion] is not sent again."""
 
 
@@ -46,22 +46,22 @@ class Node:
         self._wxyz = np.full(4, np.nan)
         self._sent: dict[str, Any] = {}
 
-    def show(self, visible: bool) -> None:
+    def set_visible(self, visible: bool) -> None:
         if visible != self._visible:
             self._visible = visible
             self._handle.visible = visible
 
-    def place(self, position: np.ndarray) -> None:
-        if not np.abs(position - self._position).max() < STILL:
+    def set_position(self, position: np.ndarray) -> None:
+        if not np.abs(position - self._position).max() < POSE_TOLERANCE:
             self._position = position.copy()
             self._handle.position = position
 
-    def turn(self, wxyz: np.ndarray) -> None:
-        if not np.abs(wxyz - self._wxyz).max() < STILL:
+    def set_orientation(self, wxyz: np.ndarray) -> None:
+        if not np.abs(wxyz - self._wxyz).max() < POSE_TOLERANCE:
             self._wxyz = wxyz.copy()
             self._handle.wxyz = wxyz
 
-    def send(self, prop: str, value: Any) -> None:
+    def set_property(self, prop: str, value: Any) -> None:
         if prop not in self._sent or not np.array_equal(self._sent[prop], value):
             self._sent[prop] = value
             setattr(self._handle, prop, value)
@@ -88,18 +88,18 @@ class ArmNode(Node):
         self._poses = np.full((self._model.njoints - 1, 7), np.nan)
         pieces = arm.visuals if view.graphics == "high" and not ghost else arm.collisions
         for index, piece in enumerate(pieces):
-            self._piece(f"{self._paths[piece.joint]}/piece{index}", piece, ghost, view)
-        self._outline = meshes.outline(arm.collisions)
+            self._add_piece(f"{self._paths[piece.joint]}/piece{index}", piece, ghost, view)
+        self._outline = meshes.outline_points(arm.collisions)
         self._rings: list[Any] = []
         self._levels: list[int] = []
 
-    def move(self, q: np.ndarray) -> None:
+    def set_configuration(self, q: np.ndarray) -> None:
         """Places every joint that moved in its parent's frame."""
         pin.forwardKinematics(self._model, self._data, q)
         in_parent = self._data.liMi
         poses = np.array([pin.SE3ToXYZQUAT(in_parent[j]) for j in range(1, self._model.njoints)])
         # Not "moved by more": the first poses are compared with NaN.
-        still = np.abs(poses - self._poses) < STILL
+        still = np.abs(poses - self._poses) < POSE_TOLERANCE
         for joint in np.flatnonzero(~still[:, 3:].all(axis=1)):
             self._joints[joint].wxyz = poses[joint, [6, 3, 4, 5]]
             self._poses[joint, 3:] = poses[joint, 3:]
@@ -107,17 +107,17 @@ class ArmNode(Node):
             self._joints[joint].position = poses[joint, :3]
             self._poses[joint, :3] = poses[joint, :3]
 
-    def outline(self) -> np.ndarray:
+    def outline_points(self) -> np.ndarray:
         """(k, 3) [m]: points on what can be seen of it, where it was moved last."""
         at = self._data.oMi
         return np.concatenate(
             [points @ at[j].rotation.T + at[j].translation for j, points in self._outline.items()]
         )
 
-    def rings(self, effort: np.ndarray) -> None:
+    def mark_torque_limits(self, effort: np.ndarray) -> None:
         """A ring on every joint near its torque limit: amber from 0.8, red at the limit."""
         if not self._rings:
-            self._rings = [self._ring(joint) for joint in range(1, self._model.njoints)]
+            self._rings = [self._add_ring(joint) for joint in range(1, self._model.njoints)]
             self._levels = [0] * len(self._rings)
         for joint, handle in enumerate(self._rings):
             level = int(effort[joint] >= 0.8) + int(effort[joint] >= 0.999)
@@ -126,7 +126,7 @@ class ArmNode(Node):
                 handle.visible = level > 0
                 handle.color = COLORS["warning"] if level == 2 else AMBER
 
-    def _ring(self, joint: int) -> Any:
+    def _add_ring(self, joint: int) -> Any:
         subspace = np.reshape(self._model.joints[joint].createData().S, (6, -1))[:, 0]
         # About the axis a joint turns about; where it slides, around the direction it slides in.
         axis = subspace[3:] if subspace[3:].any() else subspace[:3]
@@ -136,18 +136,18 @@ class ArmNode(Node):
             vertices,
             faces,
             color=AMBER,
-            wxyz=_turn_z_to(axis),
+            wxyz=_rotation_from_z(axis),
             visible=False,
             cast_shadow=False,
         )
 
-    def _piece(self, path: str, piece: Visual, ghost: bool, view: View) -> None:
+    def _add_piece(self, path: str, piece: Visual, ghost: bool, view: View) -> None:
         pose = pin.SE3ToXYZQUAT(piece.placement)
         place = {"position": pose[:3], "wxyz": pose[[6, 3, 4, 5]]}
         if piece.mesh and view.graphics == "high" and not ghost:
-            self._scene.add_glb(path, meshes.gltf(piece), **place)
+            self._scene.add_glb(path, meshes.to_gltf(piece), **place)
             return
-        vertices, faces = meshes.triangles(piece)
+        vertices, faces = meshes.to_triangles(piece)
         if ghost:
             center = vertices.mean(axis=0)
             vertices = center + GHOST_SCALE * (vertices - center)
@@ -184,9 +184,9 @@ class EllipsoidNode(Node):
             )
         )
 
-    def stretch(self, axes: np.ndarray) -> None:
+    def set_axes(self, axes: np.ndarray) -> None:
         """The image of the unit ball under `axes` (3, 3) [m]."""
-        self.send("vertices", (self._vertices @ axes.T).astype(np.float32))
+        self.set_property("vertices", (self._vertices @ axes.T).astype(np.float32))
 
 
 class DotsNode(Node):
@@ -206,6 +206,6 @@ class DotsNode(Node):
         )
 
 
-def _turn_z_to(axis: np.ndarray) -> np.ndarray:
+def _rotation_from_z(axis: np.ndarray) -> np.ndarray:
     quaternion = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis)
     return np.asarray(quaternion.coeffs()[[3, 0, 1, 2]])

@@ -18,9 +18,9 @@ from starlette.types import Scope
 from labs import plots
 from labs.engine.catalog import CatalogEntry, catalog
 from labs.params import Params
-from server.articles import render, words
+from server.articles import render, search_words
 from server.experiments import PACES, WINDOWS
-from server.formulas import tex
+from server.formulas import tex_to_mathml
 
 STATIC = Path(__file__).parent.parent / "static"
 
@@ -41,10 +41,10 @@ VENDOR = {
 router = APIRouter(include_in_schema=False)
 
 
-def install(app: FastAPI) -> None:
+def install_pages(app: FastAPI) -> None:
     """Adds the pages and the static files to the application."""
     app.include_router(router)
-    app.mount("/static", _Static(directory=STATIC), name="static")
+    app.mount("/static", _StaticFiles(directory=STATIC), name="static")
 
 
 def vendor_url(name: str) -> str:
@@ -52,7 +52,7 @@ def vendor_url(name: str) -> str:
     return f"vendor/{name}?v={version(VENDOR[name][1])}"
 
 
-def own_version() -> str:
+def package_version() -> str:
     try:
         return version("orclab")
     except PackageNotFoundError:  # run from a checkout that is not installed
@@ -71,7 +71,7 @@ def home(request: Request) -> Response:
 def lab(request: Request, slug: str) -> Response:
     entry = catalog().get(slug)
     if entry is None:
-        return missing(request, f"No lab is called “{slug}”")
+        return not_found_page(request, f"No lab is called “{slug}”")
     entries = list(catalog().values())
     place = entries.index(entry)
     return _page(
@@ -87,7 +87,7 @@ def lab(request: Request, slug: str) -> Response:
     )
 
 
-def missing(request: Request, what: str) -> Response:
+def not_found_page(request: Request, what: str) -> Response:
     """Says what was not found, and shows the labs there are."""
     return _page(request, "missing.html", 404, what=what, chapters=_chapters())
 
@@ -131,24 +131,24 @@ def lab_data(entry: CatalogEntry) -> dict[str, Any]:
         "section": lab.section,
         "summary": lab.summary,
         "chapter": {"number": entry.chapter, "title": entry.chapter_title},
-        "params": [_with_mathml(tunable) for tunable in lab.Params.describe()],
-        "plots": [_with_mathml(plots.describe(plot)) for plot in lab.plots],
+        "params": [_add_mathml(tunable) for tunable in lab.Params.describe()],
+        "plots": [_add_mathml(plots.describe(plot)) for plot in lab.plots],
         "presets": {name: dict(values) for name, values in lab.presets.items()},
         "actions": [vars(action) for action in lab.actions],
         "experiments": [experiment.describe() for experiment in render(entry).experiments],
         "period": lab.period,
         "has_world": lab.has_world(),
         "has_solver": lab.has_solver(),
-        "version": own_version(),
+        "version": package_version(),
     }
 
 
-def _with_mathml(data: dict[str, Any]) -> dict[str, Any]:
+def _add_mathml(data: dict[str, Any]) -> dict[str, Any]:
     """Adds to every symbol, also those of a plot's lines, its MathML."""
     if data.get("symbol"):
-        data = data | {"mathml": tex(data["symbol"])}
+        data = data | {"mathml": tex_to_mathml(data["symbol"])}
     if data.get("lines"):
-        data = data | {"lines": [_with_mathml(line) for line in data["lines"]]}
+        data = data | {"lines": [_add_mathml(line) for line in data["lines"]]}
     return data
 
 
@@ -159,7 +159,7 @@ def _groups(params: type[Params]) -> list[tuple[str, list[dict[str, Any]]]]:
     for tunable in params.describe():
         heading = "" if tunable["key"] else tunable["group"] or "Parameters"
         acts = params().acts(tunable["name"])
-        groups.setdefault(heading, []).append(_with_mathml(tunable) | {"acts": acts})
+        groups.setdefault(heading, []).append(_add_mathml(tunable) | {"acts": acts})
     return [(heading, tunables) for heading, tunables in groups.items() if tunables]
 
 
@@ -177,15 +177,16 @@ def _page(request: Request, template: str, status: int = 200, **context: Any) ->
     html = _templates().get_template(template).render(root=root, **context)
     policy = (
         "default-src 'self'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
-        f"img-src 'self' data: blob:; connect-src 'self'{sockets(request)}; frame-src 'self'; "
-        "frame-ancestors 'self'; object-src 'none'; base-uri 'none'; form-action 'self'"
+        f"img-src 'self' data: blob:; connect-src 'self'{websocket_sources(request)}; "
+        "frame-src 'self'; frame-ancestors 'self'; object-src 'none'; base-uri 'none'; "
+        "form-action 'self'"
     )
     return HTMLResponse(
         html, status, {"Content-Security-Policy": policy, "Cache-Control": "no-cache"}
     )
 
 
-def sockets(request: Request) -> str:
+def websocket_sources(request: Request) -> str:
     """What a page's policy says of the scene's and the stream's WebSockets, which are of this host:
     not every browser takes 'self' for them. Behind a proxy the host may have another name."""
     origins = request.app.state.settings.origins
@@ -203,9 +204,9 @@ def _templates() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.globals.update(vendor=vendor_url, version=own_version(), words=words)
+    environment.globals.update(vendor=vendor_url, version=package_version(), words=search_words)
     environment.globals.update(paces=PACES, windows=WINDOWS)
-    environment.filters["tex"] = lambda source: Markup(tex(source))
+    environment.filters["tex"] = lambda source: Markup(tex_to_mathml(source))
     environment.filters["number"] = lambda value: f"{value:.6g}".replace("-", "\u2212")
     return environment
 
@@ -228,7 +229,7 @@ def _vendor_file(name: str) -> Path:
     return Path(spec.submodule_search_locations[0]) / inside
 
 
-class _Static(StaticFiles):
+class _StaticFiles(StaticFiles):
     """Our own files: always asked for again, so that a new release shows at once."""
 
     def file_response(self, *args: Any, **kwargs: Any) -> Response:

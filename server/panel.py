@@ -15,9 +15,9 @@ from labs.lab import Action
 from labs.params import Choice, Knob, Params, Text, Tunable, Value
 from server.mailbox import Mailbox
 
-Show = Callable[[Value, str], None]
+ShowValue = Callable[[Value, str], None]
 """A value, and its unit."""
-TICKS = 1000
+SLIDER_STEPS = 1000
 
 
 class Panel:
@@ -25,7 +25,7 @@ class Panel:
 
     def __init__(self, server: viser.ViserServer, mailbox: Mailbox, world: World) -> None:
         self._gui, self._mailbox = server.gui, mailbox
-        self._controls: dict[str, tuple[Any, Show]] = {}
+        self._controls: dict[str, tuple[Any, ShowValue]] = {}
         self._shown: dict[str, tuple[Value, str]] = {}
         server.gui.set_panel_label(world.lab.title)
         for name, tunable in world.params.tunables.items():
@@ -46,7 +46,7 @@ class Panel:
                 show(values[name], unit)
                 self._shown[name] = values[name], unit
 
-    def _add(self, name: str, tunable: Tunable, value: Value) -> tuple[Any, Show]:
+    def _add(self, name: str, tunable: Tunable, value: Value) -> tuple[Any, ShowValue]:
         match tunable:
             case Knob():
                 return self._slider(name, tunable, float(value))
@@ -54,29 +54,31 @@ class Panel:
                 return self._menu(name, tunable, value)
             case _:
                 box = self._gui.add_checkbox(tunable.label, bool(value), hint=tunable.help)
-                return self._wire(box, name)
+                return self._connect(box, name)
 
-    def _slider(self, name: str, knob: Knob, value: float) -> tuple[Any, Show]:
+    def _slider(self, name: str, knob: Knob, value: float) -> tuple[Any, ShowValue]:
         slider: Any = self._gui.add_slider(
             knob.label,
             0.0,
             1.0,
-            1 / TICKS,
-            _tick(knob, value),
-            marks=tuple((_tick(knob, mark), f"{mark:g}") for mark in _marks(knob)),
+            1 / SLIDER_STEPS,
+            _slider_position(knob, value),
+            marks=tuple(
+                (_slider_position(knob, mark), f"{mark:g}") for mark in _slider_marks(knob)
+            ),
             hint=knob.help,
         )
-        self._wire(slider, name, read=knob.at)
+        self._connect(slider, name, read=knob.at)
 
         def show(value: Value, unit: str) -> None:
             slider.label = f"{knob.label} = {float(value):.6g} {unit}".rstrip()
             # One that is where it leads already is left alone: the hand may still be on it.
             if knob.at(slider.value) != value:
-                slider.value = _tick(knob, float(value))
+                slider.value = _slider_position(knob, float(value))
 
         return slider, show
 
-    def _menu(self, name: str, choice: Choice, value: Value) -> tuple[Any, Show]:
+    def _menu(self, name: str, choice: Choice, value: Value) -> tuple[Any, ShowValue]:
         labels = [str(text) for text in choice.options.values()]
         values = list(choice.options)
         menu = self._gui.add_dropdown(
@@ -85,20 +87,20 @@ class Panel:
             initial_value=labels[values.index(value)],
             hint=choice.help,
         )
-        return self._wire(
+        return self._connect(
             menu,
             name,
             read=lambda label: values[labels.index(label)],
             write=lambda v: labels[values.index(v)],
         )
 
-    def _wire(
+    def _connect(
         self,
         control: Any,
         name: str,
         read: Callable[[Any], Value] = lambda value: value,
         write: Callable[[Any], Any] = lambda value: value,
-    ) -> tuple[Any, Show]:
+    ) -> tuple[Any, ShowValue]:
         # Asynchronous callbacks run in order on Viser's event loop; plain ones do not.
         @control.on_update  # type: ignore[untyped-decorator]
         async def _(event: Any) -> None:
@@ -119,11 +121,11 @@ class Panel:
             self._mailbox.put("press", action=action.name)
 
 
-def _tick(knob: Knob, value: float) -> float:
-    return round(knob.position(value) * TICKS) / TICKS
+def _slider_position(knob: Knob, value: float) -> float:
+    return round(knob.position(value) * SLIDER_STEPS) / SLIDER_STEPS
 
 
-def _marks(knob: Knob) -> list[float]:
+def _slider_marks(knob: Knob) -> list[float]:
     """The ends; on a logarithmic track also the powers of ten between them that leave room for
     their digits."""
     if knob.scale == "linear":

@@ -16,12 +16,12 @@ STREAM, HELLO, STATUS, CONTROL = range(4)
 """STREAM: telemetry. HELLO, STATUS: the latest is kept. CONTROL: for the web process."""
 
 
-def frame(kind: int, payload: bytes) -> bytes:
+def encode_frame(kind: int, payload: bytes) -> bytes:
     """The bytes of one frame."""
     return HEADER.pack(len(payload), kind) + payload
 
 
-def encode(message: Any) -> bytes:
+def encode_json(message: Any) -> bytes:
     """JSON; arrays become lists, NaN becomes null."""
     return orjson.dumps(message, default=_array_to_list, option=orjson.OPT_SERIALIZE_NUMPY)
 
@@ -33,7 +33,7 @@ def _array_to_list(value: object) -> object:
     raise TypeError(f"{type(value).__name__} has no place in a message")
 
 
-class Link:
+class WorkerPipe:
     """The worker's end."""
 
     def __init__(self, sock: socket.socket) -> None:
@@ -42,19 +42,19 @@ class Link:
 
     def send(self, kind: int, message: Any) -> None:
         """Sends one frame, from any thread. Raises OSError once the web process is gone."""
-        data = frame(kind, encode(message))
+        data = encode_frame(kind, encode_json(message))
         with self._lock:
             self._socket.sendall(data)
 
     def receive(self) -> dict[str, Any] | None:
         """The next message from the web process; None once it is gone."""
-        header = self._read(HEADER.size)
+        header = self._read_exactly(HEADER.size)
         if header is None:
             return None
-        payload = self._read(HEADER.unpack(header)[0])
+        payload = self._read_exactly(HEADER.unpack(header)[0])
         return None if payload is None else orjson.loads(payload)
 
-    def _read(self, count: int) -> bytes | None:
+    def _read_exactly(self, count: int) -> bytes | None:
         data = bytearray()
         while len(data) < count:
             try:

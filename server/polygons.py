@@ -10,14 +10,14 @@ from server.boards import exposure
 from server.messages import View
 from server.nodes import COLORS, Node
 
-PADDING = 8
+CORNER_MULTIPLE = 8
 """The corners of a mesh are a multiple of so many, the last one several times: one that gains a
 corner is most often the same mesh, and only its corners are sent."""
 
 
 def padded_count(corners: np.ndarray) -> int:
     """How many corners the mesh of a polygon with these has."""
-    return -(-len(corners) // PADDING) * PADDING
+    return -(-len(corners) // CORNER_MULTIPLE) * CORNER_MULTIPLE
 
 
 class PolygonNode(Node):
@@ -38,7 +38,7 @@ class PolygonNode(Node):
         super().__init__(
             server.scene.add_mesh_simple(
                 path,
-                _padded(corners),
+                _pad_corners(corners),
                 np.stack([np.zeros_like(others), others, others + 1], axis=1),
                 color=np.round(255 * from_linear(np.minimum(light, 1.0))).astype(np.uint8),
                 opacity=opacity if opacity < 1.0 else None,
@@ -51,9 +51,9 @@ class PolygonNode(Node):
 
     def draw(self, corners: np.ndarray) -> None:
         """Sends the corners (k, 3) [m] if they changed."""
-        self.send("vertices", _padded(corners))
+        self.set_property("vertices", _pad_corners(corners))
 
 
-def _padded(corners: np.ndarray) -> np.ndarray:
+def _pad_corners(corners: np.ndarray) -> np.ndarray:
     missing = padded_count(corners) - len(corners)
     return np.pad(corners.astype(np.float32), ((0, missing), (0, 0)), mode="edge")

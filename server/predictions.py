@@ -49,7 +49,7 @@ class CurveQuestion:
 Prediction = ChoiceQuestion | NumberQuestion | CurveQuestion
 
 
-def read(
+def read_prediction(
     lab: Lab[Any, Any], data: dict[str, Any], watch: tuple[str, ...], html: Callable[[str], str]
 ) -> Prediction:
     """What a block `[predict]` asks; `html` renders its Markdown. Raises ArticleError."""
@@ -147,7 +147,7 @@ class _QuestionReader:
         return self.html(text).strip().removeprefix("<p>").removesuffix("</p>")
 
 
-def form(predict: Prediction | None, number: int) -> str:
+def prediction_form(predict: Prediction | None, number: int) -> str:
     """Where the reader commits to a guess, in the card of the experiment of this number."""
     match predict:
         case None:

@@ -9,32 +9,32 @@ import server.worker  # noqa: F401  (imports Viser, Pinocchio and all labs' code
 from labs import compiled
 from labs.engine.catalog import CatalogEntry, catalog
 from labs.errors import LabError
-from labs.models.arms import ARMS, load
+from labs.models.arms import ARMS, load_arm
 from server import fork_server, meshes
 
-WHAT = "compiling the solvers, once; this may take a minute ..."
-PATIENCE = 1.0
+COMPILING_MESSAGE = "compiling the solvers, once; this may take a minute ..."
+MESSAGE_DELAY = 1.0
 """[s] Compiling that takes longer is told on the terminal."""
 
 
-def _watch(parent: int, compiling: threading.Event, over: threading.Event) -> None:
+def _watch_parent(parent: int, compiling: threading.Event, over: threading.Event) -> None:
     """Says why it takes long, and ends with the server: who compiles hears of nothing else."""
     since = 0.0
     while not over.wait(0.25):
         if os.getppid() != parent:
             os._exit(1)
-        if compiling.is_set() and since < PATIENCE:
+        if compiling.is_set() and since < MESSAGE_DELAY:
             since += 0.25
-            if since >= PATIENCE:
-                print(f"First start: {WHAT}", flush=True)
+            if since >= MESSAGE_DELAY:
+                print(f"First start: {COMPILING_MESSAGE}", flush=True)
 
 
-def _prepare() -> None:
+def _compile_labs() -> None:
     """Compiled code is kept on disk: a second start finds it."""
-    if compiled.NOTE:
-        print(compiled.NOTE, flush=True)
+    if compiled.CACHE_NOTE:
+        print(compiled.CACHE_NOTE, flush=True)
     compiling, over = threading.Event(), threading.Event()
-    waiting = threading.Thread(target=_watch, args=(os.getppid(), compiling, over))
+    waiting = threading.Thread(target=_watch_parent, args=(os.getppid(), compiling, over))
     waiting.start()
     try:
         with compiled.on_compilation(compiling.set):
@@ -52,16 +52,16 @@ def _entries() -> list[CatalogEntry]:
         sys.exit(1)  # the web process finds it too, and says it
 
 
-fork_server.endure_broken_requests()
-_prepare()
+fork_server.tolerate_broken_requests()
+_compile_labs()
 for _name in ARMS:
-    _arm = load(_name)
+    _arm = load_arm(_name)
     for _piece in _arm.visuals:
         if _piece.mesh:
-            meshes.gltf(_piece)
+            meshes.to_gltf(_piece)
     for _piece in (*_arm.collisions, *(p for p in _arm.visuals if not p.mesh)):
-        meshes.triangles(_piece)
-    meshes.outline(_arm.collisions)
+        meshes.to_triangles(_piece)
+    meshes.outline_points(_arm.collisions)
 meshes.torus(0.095, 0.009)
 meshes.ball()
 # What is loaded now is never collected: its pages stay shared among all workers.

@@ -17,8 +17,8 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
-from server.pages import sockets
-from server.sessions import NoSession, Sessions
+from server.pages import websocket_sources
+from server.sessions import Sessions, UnknownSession
 
 router = APIRouter(include_in_schema=False)
 
@@ -26,7 +26,7 @@ GONE, TRY_AGAIN = 4404, 1013
 RESTARTING = "the scene is being restarted: try again in a moment"
 CLOSE_SECONDS = 0.5
 """A worker, which may be busy or gone, is not waited for longer: nobody is at that end."""
-OURS = (
+HEAD_INSERT = (
     b'<link rel="stylesheet" href="../../static/css/scene.css">'
     b'<script type="module" src="../../static/js/scene.js"></script>'
 )
@@ -47,7 +47,7 @@ def viser_page() -> tuple[bytes, bytes]:
     page = (Path(spec.origin).parent / "client" / "build" / "index.html").read_bytes()
     start, end = page.index(b"<script"), page.index(SCRIPT_END) + len(SCRIPT_END)
     script, page = page[start:end], page[:start] + page[end:]
-    page = page.replace(b"</head>", OURS + b"</head>", 1)
+    page = page.replace(b"</head>", HEAD_INSERT + b"</head>", 1)
     page = page.replace(b"</body>", script + b"</body>", 1)
     return page, gzip.compress(page)
 
@@ -58,14 +58,14 @@ async def scene_page(request: Request, session_id: str) -> Response:
     sessions: Sessions = request.app.state.sessions
     try:
         sessions.find(session_id)
-    except NoSession as error:
+    except UnknownSession as error:
         return HTMLResponse(f"<!doctype html><title>No scene</title><p>{error}</p>", 404)
     plain, compressed = viser_page()
     policy = (
         # Viser's client is one page with its script in it, which compiles and decodes in workers.
         "default-src 'self'; script-src 'self' 'unsafe-inline' 'unsafe-eval' blob: data:; "
         "worker-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; font-src 'self' data:; "
-        f"img-src 'self' data: blob:; connect-src 'self' data: blob:{sockets(request)}; "
+        f"img-src 'self' data: blob:; connect-src 'self' data: blob:{websocket_sources(request)}; "
         "frame-ancestors 'self'; object-src 'none'; base-uri 'none'; form-action 'none'"
     )
     headers = {
@@ -85,7 +85,7 @@ async def scene_socket(socket: WebSocket, session_id: str) -> None:
     offered = [p for p in socket.scope["subprotocols"] if p.startswith("viser-v")]
     try:
         worker = sessions.find(session_id).worker
-    except NoSession as error:
+    except UnknownSession as error:
         await socket.accept(offered[0] if offered else None)
         await socket.close(GONE, str(error)[:120])
         return

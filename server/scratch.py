@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 PREFIX = "orclab-"
-NEW = 60.0
+MIN_AGE = 60.0
 """[s] A folder younger than this may not be locked yet."""
 
 
@@ -18,7 +18,7 @@ NEW = 60.0
 def scratch_folder() -> Iterator[Path]:
     """A temporary folder of our own, locked as long as it is in use. What servers that were killed
     have left behind is deleted first."""
-    _sweep(Path(tempfile.gettempdir()))
+    _delete_abandoned(Path(tempfile.gettempdir()))
     with tempfile.TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True) as name:
         lock = os.open(name, os.O_RDONLY)
         try:
@@ -28,12 +28,12 @@ def scratch_folder() -> Iterator[Path]:
             os.close(lock)
 
 
-def _sweep(parent: Path) -> None:
+def _delete_abandoned(parent: Path) -> None:
     for folder in parent.glob(f"{PREFIX}*"):
         with contextlib.suppress(OSError):
             about = folder.lstat()
             ours = about.st_uid == os.getuid() and folder.is_dir() and not folder.is_symlink()
-            if ours and time.time() - about.st_mtime > NEW and _is_abandoned(folder):
+            if ours and time.time() - about.st_mtime > MIN_AGE and _is_abandoned(folder):
                 shutil.rmtree(folder, ignore_errors=True)
 
 

@@ -21,7 +21,7 @@ from server.websocket_protocol import WebSocketProtocol
 
 MAX_MESSAGE = 2**20
 """[bytes] Of a WebSocket's message from a browser, whose slider or camera was moved."""
-PEERS_FAULTS = (UnicodeDecodeError, ClientDisconnect, ConnectionError, h11.LocalProtocolError)
+PEER_ERRORS = (UnicodeDecodeError, ClientDisconnect, ConnectionError, h11.LocalProtocolError)
 
 
 def serve(options: argparse.Namespace) -> int:
@@ -30,7 +30,7 @@ def serve(options: argparse.Namespace) -> int:
     try:
         settings = Settings(**given)
     except (ValidationError, SettingsError) as error:
-        raise LabError(_wrong_settings(error)) from None
+        raise LabError(_settings_error(error)) from None
     try:
         tempfile.gettempdir()
     except FileNotFoundError:
@@ -39,7 +39,7 @@ def serve(options: argparse.Namespace) -> int:
             "one, such as /dev/shm"
         ) from None
     listener = _listen(settings.host, settings.port)
-    fork_server.start()
+    fork_server.start_fork_server()
     from server.app import create_app  # loads all labs, beside the fork server
 
     host, port = listener.getsockname()[:2]
@@ -55,13 +55,13 @@ def serve(options: argparse.Namespace) -> int:
         timeout_graceful_shutdown=2,
         server_header=False,
     )
-    logging.getLogger("uvicorn.error").addFilter(_in_one_line)
+    logging.getLogger("uvicorn.error").addFilter(_shorten_peer_errors)
     server = _Server(config)
 
     async def announce() -> None:
         while not server.started:
             await asyncio.sleep(0.02)
-        own, *others = addresses(host)
+        own, *others = host_addresses(host)
         own = f"http://{own}:{port}{settings.root_path}"
         print(f"orclab is at {own}  (Ctrl+C ends it)", flush=True)
         for other in others:
@@ -81,7 +81,7 @@ def serve(options: argparse.Namespace) -> int:
     return 0
 
 
-def addresses(host: str) -> list[str]:
+def host_addresses(host: str) -> list[str]:
     """Names for `host` in an address: first what this machine opens, then, where it listens to
     all, what others open: its addresses in the network."""
     if host not in ("0.0.0.0", "::"):
@@ -112,17 +112,17 @@ class _Server(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-def _in_one_line(record: logging.LogRecord) -> bool:
+def _shorten_peer_errors(record: logging.LogRecord) -> bool:
     """What somebody at the other end did wrong, or left unfinished, is no defect with a trace."""
     error = record.exc_info[1] if record.exc_info else None
-    if isinstance(error, PEERS_FAULTS):
+    if isinstance(error, PEER_ERRORS):
         record.msg = f"a connection was broken off or broken: {type(error).__name__}"
         record.args, record.exc_info, record.levelno = (), None, logging.WARNING
         record.levelname = "WARNING"
     return True
 
 
-def _wrong_settings(error: Exception) -> str:
+def _settings_error(error: Exception) -> str:
     if not isinstance(error, ValidationError):
         return f"ORCLAB_ORIGINS takes a JSON list of addresses ({error})"
     return "; ".join(

@@ -14,13 +14,13 @@ from labs.params import Params
 from server.messages import Notice, SessionInfo, View
 from server.pipe import HELLO, STATUS
 from server.supervisor import Supervisor, Worker, WorkerGone
+from server.uptime_clock import UptimeClock
 from server.viewers import Viewer
-from server.waking_clock import WakingClock
 
 CRASHES, CRASH_SECONDS = 3, 60.0
 
 
-class Unavailable(LabError):
+class SessionUnavailable(LabError):
     """The session's worker is being replaced."""
 
 
@@ -34,7 +34,7 @@ class Session:
         seed: int,
         view: View,
         remarks: Sequence[str],
-        clock: WakingClock,
+        clock: UptimeClock,
     ) -> None:
         """`remarks` are on the link it was opened by."""
         self._clock = clock
@@ -74,7 +74,7 @@ class Session:
 
     async def open(self, supervisor: Supervisor) -> None:
         """Takes a worker and sets it to work where the last one ended."""
-        worker = await supervisor.take()
+        worker = await supervisor.take_worker()
         worker.on_frame = self._on_frame
         self.worker = worker
         self.state = "live"
@@ -93,7 +93,7 @@ class Session:
         try:
             return await self._live_worker().ask(do, **arguments)
         except WorkerGone:
-            raise self._unavailable() from None
+            raise self._unavailable_error() from None
 
     async def load(self, path: str) -> dict[str, Any]:
         """Takes up a solution from a file; answers all parameters. Raises LabError, Unavailable."""
@@ -101,41 +101,45 @@ class Session:
         self._latest["params"] = params
         return params
 
-    async def write(self, what: str, form: str, path: str, **more: Any) -> None:
+    async def write_file(self, what: str, form: str, path: str, **more: Any) -> None:
         """Writes the recording ("export"), the solution or plots to a file. Raises as `ask`."""
         try:
             await self._live_worker().ask_for_file(what, form=form, path=path, **more)
         except WorkerGone:
-            raise self._unavailable() from None
+            raise self._unavailable_error() from None
 
     def _live_worker(self) -> Worker:
         if self.worker is None or self.worker.gone:
-            raise self._unavailable()
+            raise self._unavailable_error()
         return self.worker
 
-    def _unavailable(self) -> Unavailable:
+    def _unavailable_error(self) -> SessionUnavailable:
         if self.state == "failed":
-            return Unavailable("this session has ended after repeated crashes: open the lab anew")
+            return SessionUnavailable(
+                "this session has ended after repeated crashes: open the lab anew"
+            )
         if self.worker and not self.worker.gone:
-            return Unavailable("the simulation is busy and does not answer: try again in a moment")
-        return Unavailable("the simulation is being restarted: try again in a moment")
+            return SessionUnavailable(
+                "the simulation is busy and does not answer: try again in a moment"
+            )
+        return SessionUnavailable("the simulation is being restarted: try again in a moment")
 
     # Viewers ------------------------------------------------------------------------------------
 
-    def join(self) -> Viewer:
+    def add_viewer(self) -> Viewer:
         """A page begins to watch."""
         viewer = Viewer()
         for payload in self._latest_frames.values():
             viewer.push(payload, [])
         self.viewers.add(viewer)
-        self._count()
+        self._send_viewer_count()
         return viewer
 
-    def leave(self, viewer: Viewer) -> None:
+    def remove_viewer(self, viewer: Viewer) -> None:
         """A page no longer watches."""
         self.viewers.discard(viewer)
         self.watched = self._clock.now
-        self._count()
+        self._send_viewer_count()
 
     def notify(self, state: str, text: str) -> None:
         """Says something to every viewer."""
@@ -146,7 +150,7 @@ class Session:
         """Says something to one viewer."""
         viewer.push(payload, list(self._latest_frames.values()))
 
-    def _count(self) -> None:
+    def _send_viewer_count(self) -> None:
         with contextlib.suppress(WorkerGone):
             if self.worker:
                 self.worker.send("viewers", count=len(self.viewers))
@@ -167,7 +171,7 @@ class Session:
                 self._latest[name] = status[name]
         self._broadcast(payload)
 
-    def crashed(self) -> bool:
+    def record_crash(self) -> bool:
         """Notes a crash; True when there were too many of late."""
         now = self._clock.now
         self._crashes.append(now)

@@ -7,23 +7,23 @@ from labs.engine.catalog import CatalogEntry
 from labs.engine.links import read_link
 from labs.errors import LabError
 from labs.params import Params
+from server.background_tasks import BackgroundTasks
 from server.messages import NewSession
-from server.session import CRASHES, Session, Unavailable
+from server.session import CRASHES, Session, SessionUnavailable
 from server.settings import Settings
 from server.supervisor import Supervisor, WorkerGone
-from server.tasks import Tasks
 
-LAST_WORDS = 0.5
+STOP_NOTICE_SECONDS = 0.5
 """[s] Viewers are given to hear that the server stops."""
-STOPS = "the server stops: start it again, and open the lab anew"
-STOPPED = "The server was stopped. Once it is started again, this page goes on by itself."
+STOPPING_MESSAGE = "the server stops: start it again, and open the lab anew"
+STOPPED_MESSAGE = "The server was stopped. Once it is started again, this page goes on by itself."
 
 
 class SessionsFull(LabError):
     """The limit of live sessions is reached."""
 
 
-class NoSession(LabError):
+class UnknownSession(LabError):
     """No session has this id (any more)."""
 
 
@@ -33,14 +33,14 @@ class Sessions:
     def __init__(self, settings: Settings, supervisor: Supervisor) -> None:
         self._settings, self._supervisor = settings, supervisor
         self._sessions: dict[str, Session] = {}
-        self._tasks = Tasks()
+        self._tasks = BackgroundTasks()
         self._stopping = False
 
     def __len__(self) -> int:
         return len(self._sessions)
 
     def start(self) -> None:
-        self._tasks.spawn(self._reap())
+        self._tasks.spawn(self._close_idle())
 
     async def stop(self) -> None:
         """Ends all sessions, and waits until their viewers have heard it, but not for long."""
@@ -48,18 +48,18 @@ class Sessions:
         self._tasks.cancel()
         sessions = tuple(self._sessions.values())
         for session in sessions:
-            self._close(session, "recovering", STOPPED)
+            self._close(session, "recovering", STOPPED_MESSAGE)
         with contextlib.suppress(TimeoutError):
-            async with asyncio.timeout(LAST_WORDS):
+            async with asyncio.timeout(STOP_NOTICE_SECONDS):
                 while any(session.viewers for session in sessions):
                     await asyncio.sleep(0.01)
 
     async def create(self, entry: CatalogEntry, new: NewSession) -> Session:
         """A new session. Raises SessionsFull, ParameterError."""
         # Texts are read by the lab's own code: not on the event loop.
-        params, seed, remarks = await asyncio.to_thread(_read, entry.lab.Params(), new)
+        params, seed, remarks = await asyncio.to_thread(_read_params, entry.lab.Params(), new)
         if self._stopping:
-            raise Unavailable(STOPS)
+            raise SessionUnavailable(STOPPING_MESSAGE)
         if len(self) >= self._settings.max_sessions:
             raise SessionsFull(
                 f"all {self._settings.max_sessions} places are taken: close another lab's page, "
@@ -73,12 +73,14 @@ class Sessions:
             # Whatever it was: a session that never lived takes no place.
             self._close(session, "failed", str(error))
             if isinstance(error, WorkerGone):
-                raise Unavailable(f"the lab could not be opened ({error}): try again") from None
+                raise SessionUnavailable(
+                    f"the lab could not be opened ({error}): try again"
+                ) from None
             raise
         if session.id not in self._sessions:
             self._close(session, "ended", "")
-            raise Unavailable("the session was closed before it opened: open the lab anew")
-        self._watch(session)
+            raise SessionUnavailable("the session was closed before it opened: open the lab anew")
+        self._recover_when_gone(session)
         return session
 
     def find(self, session_id: str) -> Session:
@@ -87,8 +89,8 @@ class Sessions:
             return self._sessions[session_id]
         except KeyError:
             if self._stopping:
-                raise Unavailable(STOPS) from None
-            raise NoSession(
+                raise SessionUnavailable(STOPPING_MESSAGE) from None
+            raise UnknownSession(
                 "no session has this id: it ended, or the server was restarted; open the lab anew"
             ) from None
 
@@ -96,7 +98,7 @@ class Sessions:
         """Ends a session. Raises NoSession."""
         self._close(self.find(session_id), "ended", "This session was closed.")
 
-    def _watch(self, session: Session) -> None:
+    def _recover_when_gone(self, session: Session) -> None:
         worker = session.worker
         assert worker is not None
         worker.on_gone = lambda reason: self._tasks.spawn(self._recover(session, reason))
@@ -107,7 +109,7 @@ class Sessions:
         if session.id not in self._sessions:
             return
         session.worker = None
-        if session.crashed():
+        if session.record_crash():
             session.state = "failed"
             session.notify(
                 "failed",
@@ -129,7 +131,7 @@ class Sessions:
             self._close(session, "ended", "")
             return
         session.notify("live", f"The simulation was restarted with your parameters: {reason}.")
-        self._watch(session)
+        self._recover_when_gone(session)
 
     def _close(self, session: Session, state: str, text: str) -> None:
         self._sessions.pop(session.id, None)
@@ -139,9 +141,9 @@ class Sessions:
         worker, session.worker = session.worker, None
         if worker:
             worker.on_gone = lambda reason: None
-            self._tasks.spawn(self._supervisor.release(worker, "its session ended"))
+            self._tasks.spawn(self._supervisor.release_worker(worker, "its session ended"))
 
-    async def _reap(self) -> None:
+    async def _close_idle(self) -> None:
         settings = self._settings
         while True:
             await asyncio.sleep(min(1.0, settings.viewerless_seconds / 2))
@@ -161,7 +163,7 @@ class Sessions:
                     )
 
 
-def _read(defaults: Params, new: NewSession) -> tuple[Params, int, list[str]]:
+def _read_params(defaults: Params, new: NewSession) -> tuple[Params, int, list[str]]:
     """Parameters, seed, and remarks on the link. Raises ParameterError."""
     params, seed, remarks = read_link(defaults, new.link)
     return params.change(new.params), new.seed if seed is None else seed, remarks

@@ -7,13 +7,13 @@ from pydantic import AfterValidator, Field
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 
-def _origin(text: str) -> str:
+def _check_origin(text: str) -> str:
     if not re.fullmatch(r"https?://([\w.-]+|\[[0-9a-f:]+\])(:\d{1,5})?", text, re.IGNORECASE):
         raise ValueError("an origin is http or https of a host, with its port where there is one")
     return text.lower()
 
 
-def _root_path(text: str) -> str:
+def _check_root_path(text: str) -> str:
     path = text.rstrip("/")
     if not re.fullmatch(r"(/[\w.~%@+-]+)*", path):
         raise ValueError("a path begins with a slash: /user/student/proxy/8301")
@@ -44,7 +44,7 @@ class Settings(BaseSettings):
     """A larger request body is refused."""
     max_solution_bytes: Annotated[int, Field(ge=1024, le=2**26)] = 2**24
     """A larger file of a solution is refused."""
-    origins: tuple[Annotated[str, AfterValidator(_origin)], ...] = ()
+    origins: tuple[Annotated[str, AfterValidator(_check_origin)], ...] = ()
     """Further origins (scheme://host:port) whose pages may connect, beside the server's own."""
-    root_path: Annotated[str, AfterValidator(_root_path)] = ""
+    root_path: Annotated[str, AfterValidator(_check_root_path)] = ""
     """The path under which a proxy shows this server: /user/student/proxy/8301."""

@@ -9,7 +9,7 @@ from labs.errors import LabError
 from server.messages import SolverStatus
 
 MAX_PENDING = 1000
-SLIP = 0.2
+MAX_LAG = 0.2
 """[s] It may lag behind its pace and still catch up; what is beyond is given up."""
 ESTIMATE_AFTER = 0.5
 """[s] of its own time, before which nobody can tell how long it will take."""
@@ -29,13 +29,13 @@ class SolverClock:
         """Whether an iteration has begun and not ended."""
         self._next = 0.0
         """When the next one is due [s, wall clock]."""
-        self._begin(0.0)
+        self._on_restart(0.0)
 
-    def _sync(self, now: float) -> None:
+    def _detect_restart(self, now: float) -> None:
         if self._world.solves != self._solves:
-            self._begin(now)
+            self._on_restart(now)
 
-    def _begin(self, now: float) -> None:
+    def _on_restart(self, now: float) -> None:
         """The solver was started anew."""
         self._solves = self._world.solves
         self._pending = 0
@@ -51,7 +51,7 @@ class SolverClock:
         """Runs, pauses, steps, shows or sets the pace. Raises LabError."""
         if not self._world.lab.has_solver():
             raise LabError("this lab has no solver")
-        self._sync(time.perf_counter())
+        self._detect_restart(time.perf_counter())
         getattr(self, f"_do_{do}")(**arguments)
 
     def _do_run(self) -> None:
@@ -78,7 +78,7 @@ class SolverClock:
     def iterate(self, now: float, until: float) -> None:
         """What is due: one piece of an iteration at least, and none begins after `until`."""
         world = self._world
-        self._sync(now)
+        self._detect_restart(now)
         if self._active:
             self._spent += now - self._last
         self._last = now
@@ -113,7 +113,7 @@ class SolverClock:
         if self.pace:
             if now < self._next:
                 return False
-            self._next = max(self._next, now - SLIP) + 1.0 / self.pace
+            self._next = max(self._next, now - MAX_LAG) + 1.0 / self.pace
         return True
 
     def _progress(self) -> float:

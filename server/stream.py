@@ -14,12 +14,12 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from labs.errors import LabError
 from server.commands import Command, execute
+from server.error_responses import describe_errors
 from server.messages import Answer, Changes, Message
-from server.problems import describe
 from server.session import Session
-from server.sessions import NoSession, Sessions
+from server.sessions import Sessions, UnknownSession
+from server.uptime_clock import UptimeClock
 from server.viewers import Viewer
-from server.waking_clock import WakingClock
 
 SEND_SECONDS = 20.0
 """A viewer that takes this long for one message has left."""
@@ -31,7 +31,7 @@ RequestNumber = Annotated[int, Field(ge=0, le=2**53)]
 """Comes back with the answer."""
 
 
-class SetParams(Message):
+class ParamsRequest(Message):
     """New values of some parameters, all or none."""
 
     type: Literal["params"]
@@ -39,7 +39,7 @@ class SetParams(Message):
     changes: Changes
 
 
-class Do(Message):
+class CommandRequest(Message):
     """A command."""
 
     type: Literal["command"]
@@ -47,14 +47,14 @@ class Do(Message):
     command: Command
 
 
-class _Referenced(BaseModel):
+class _RequestReference(BaseModel):
     """Of a message that is otherwise wrong, what its answer belongs to."""
 
     ref: RequestNumber = 0
 
 
-_request: TypeAdapter[SetParams | Do] = TypeAdapter(
-    Annotated[SetParams | Do, Field(discriminator="type")]
+_request: TypeAdapter[ParamsRequest | CommandRequest] = TypeAdapter(
+    Annotated[ParamsRequest | CommandRequest, Field(discriminator="type")]
 )
 
 
@@ -65,10 +65,10 @@ async def stream(socket: WebSocket, session_id: str) -> None:
     sessions: Sessions = socket.app.state.sessions
     try:
         session = sessions.find(session_id)
-    except NoSession as error:
+    except UnknownSession as error:
         await socket.close(ENDED, str(error)[:120])
         return
-    viewer = session.join()
+    viewer = session.add_viewer()
     sending = asyncio.create_task(_send(socket, viewer))
     try:
         await _receive(socket, session, viewer)
@@ -77,7 +77,7 @@ async def stream(socket: WebSocket, session_id: str) -> None:
     except asyncio.CancelledError:
         pass  # The server stops and waits no longer.
     finally:
-        session.leave(viewer)
+        session.remove_viewer(viewer)
         sending.cancel()
 
 
@@ -98,12 +98,12 @@ async def answer_request(session: Session, text: str) -> Answer:
         request = _request.validate_json(text)
     except ValidationError as error:
         try:
-            ref = _Referenced.model_validate_json(text).ref
+            ref = _RequestReference.model_validate_json(text).ref
         except ValidationError:
             ref = 0
-        return Answer(ref=ref, error=describe(error.errors()))
+        return Answer(ref=ref, error=describe_errors(error.errors()))
     try:
-        if isinstance(request, SetParams):
+        if isinstance(request, ParamsRequest):
             await session.change(request.changes)
         else:
             await execute(session, request.command)
@@ -113,7 +113,7 @@ async def answer_request(session: Session, text: str) -> Answer:
 
 
 async def _send(socket: WebSocket, viewer: Viewer) -> None:
-    clock: WakingClock = socket.app.state.supervisor.clock
+    clock: UptimeClock = socket.app.state.supervisor.clock
     with contextlib.suppress(WebSocketDisconnect, RuntimeError, TimeoutError):
         async for payload in viewer.messages():
             async with clock.timeout(SEND_SECONDS):

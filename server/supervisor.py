@@ -12,11 +12,11 @@ import orjson
 
 from labs.errors import LabError
 from server import fork_server
-from server.pipe import CONTROL, HEADER, encode, frame
+from server.background_tasks import BackgroundTasks
+from server.pipe import CONTROL, HEADER, encode_frame, encode_json
 from server.settings import Settings
-from server.starting import start_worker
-from server.tasks import Tasks
-from server.waking_clock import WakingClock
+from server.uptime_clock import UptimeClock
+from server.worker_start import start_worker
 
 log = logging.getLogger("orclab.supervisor")
 
@@ -26,8 +26,8 @@ SPAWN_SECONDS = 60.0
 RETRY_SECONDS = 1.0
 """Until a spare is tried again that could not be had."""
 
-Frames = Callable[[int, bytes], None]
-Gone = Callable[[str], None]
+FrameHandler = Callable[[int, bytes], None]
+GoneHandler = Callable[[str], None]
 
 
 class WorkerGone(Exception):
@@ -37,12 +37,12 @@ class WorkerGone(Exception):
 class Worker:
     """One worker process as the web process sees it."""
 
-    def __init__(self, process: Any, sock: socket.socket, clock: WakingClock) -> None:
+    def __init__(self, process: Any, sock: socket.socket, clock: UptimeClock) -> None:
         self.process = process
         self.port = 0
         """Of its Viser server, on loopback."""
-        self.on_frame: Frames = lambda kind, payload: None
-        self.on_gone: Gone = lambda reason: None
+        self.on_frame: FrameHandler = lambda kind, payload: None
+        self.on_gone: GoneHandler = lambda reason: None
         self.gone = ""
         """Why it ended, in words; empty while it lives."""
         self._socket = sock
@@ -67,41 +67,41 @@ class Worker:
     async def ask(self, do: str, **arguments: Any) -> Any:
         """What the worker answers. Raises LabError if it refuses, WorkerGone if it is gone or
         does not answer in time."""
-        return await self._answer(do, self._expect(), arguments)
+        return await self._request(do, self._register_answer(), arguments)
 
     async def ask_for_file(self, do: str, **arguments: Any) -> None:
         """Waits until the worker has written a file. Raises as `ask` does."""
-        done = self._expect()
+        done = self._register_answer()
         try:
             await self.ask(do, done=done, **arguments)
-            await self._await(done)
+            await self._await_answer(done)
         finally:
             self._answers.pop(done, None)
 
     @property
-    def silence(self) -> float:
+    def seconds_silent(self) -> float:
         """[s] since the loop was last heard."""
         return self._clock.now - self._heard
 
-    async def end(self, reason: str) -> None:
+    async def terminate(self, reason: str) -> None:
         """Terminates, then kills."""
-        self._finish(reason)
+        self._mark_gone(reason)
         with contextlib.suppress(ProcessLookupError):
             self.process.terminate()
             await asyncio.to_thread(self.process.join, 0.5)
             self.process.kill()
         await asyncio.to_thread(self.process.join, 5)
 
-    async def _answer(self, do: str, reference: int, arguments: dict[str, Any]) -> Any:
+    async def _request(self, do: str, reference: int, arguments: dict[str, Any]) -> Any:
         self._write({"do": do, "ref": reference, "with": arguments})
-        return await self._await(reference)
+        return await self._await_answer(reference)
 
-    def _expect(self) -> int:
+    def _register_answer(self) -> int:
         self._references += 1
         self._answers[self._references] = asyncio.get_running_loop().create_future()
         return self._references
 
-    async def _await(self, reference: int) -> Any:
+    async def _await_answer(self, reference: int) -> Any:
         try:
             async with self._clock.timeout(REQUEST_SECONDS):
                 return await self._answers[reference]
@@ -113,7 +113,7 @@ class Worker:
     def _write(self, message: dict[str, Any]) -> None:
         if self.gone or not self._writer:
             raise WorkerGone(self.gone)
-        self._writer.write(frame(CONTROL, encode(message)))
+        self._writer.write(encode_frame(CONTROL, encode_json(message)))
 
     async def _listen(self) -> None:
         try:
@@ -122,14 +122,14 @@ class Worker:
                 payload = await self._reader.readexactly(size)
                 self._heard = self._clock.now
                 if kind == CONTROL:
-                    self._control(orjson.loads(payload))
+                    self._on_control(orjson.loads(payload))
                 else:
                     self.on_frame(kind, payload)
         except (asyncio.IncompleteReadError, OSError):
             await asyncio.to_thread(self.process.join, 1)
-            self._finish(_describe_exit(self.process.exitcode))
+            self._mark_gone(_describe_exit(self.process.exitcode))
 
-    def _control(self, message: dict[str, Any]) -> None:
+    def _on_control(self, message: dict[str, Any]) -> None:
         if message.get("ready") and not self._ready.done():
             self._ready.set_result(message["port"])
         answer = self._answers.get(message.get("ref", 0))
@@ -139,7 +139,7 @@ class Worker:
             else:
                 answer.set_result(message["answer"])
 
-    def _finish(self, reason: str) -> None:
+    def _mark_gone(self, reason: str) -> None:
         if self.gone:
             return
         self.gone = reason
@@ -157,11 +157,11 @@ class Supervisor:
 
     def __init__(self, settings: Settings) -> None:
         self._settings = settings
-        self._context = fork_server.context()
+        self._context = fork_server.fork_context()
         self._spares: list[Worker] = []
         self._workers: set[Worker] = set()
-        self._tasks = Tasks()
-        self.clock = WakingClock()
+        self._tasks = BackgroundTasks()
+        self.clock = UptimeClock()
         self._filling = asyncio.Lock()
         self.preparing = True
         """Whether the first worker is still awaited, while all is loaded and compiled."""
@@ -178,26 +178,26 @@ class Supervisor:
 
     def start(self) -> None:
         """Begins to watch, and warms the first spare."""
-        self._tasks.spawn(self._watch())
-        self._tasks.spawn(self._fill())
+        self._tasks.spawn(self._watch_workers())
+        self._tasks.spawn(self._fill_spares())
 
     async def stop(self) -> None:
         """Ends every worker."""
         self._tasks.cancel()
-        await asyncio.gather(*(w.end("the server stops") for w in tuple(self._workers)))
+        await asyncio.gather(*(w.terminate("the server stops") for w in tuple(self._workers)))
 
-    async def take(self) -> Worker:
+    async def take_worker(self) -> Worker:
         """A worker for a session: the warm spare, or a new one."""
         spare = next((w for w in self._spares if not w.gone), None)
         if spare:
             self._spares.remove(spare)
         worker = spare or await self._spawn()
-        self._tasks.spawn(self._fill())
+        self._tasks.spawn(self._fill_spares())
         return worker
 
-    async def release(self, worker: Worker, reason: str) -> None:
+    async def release_worker(self, worker: Worker, reason: str) -> None:
         """Ends a worker that is no longer needed."""
-        await worker.end(reason)
+        await worker.terminate(reason)
         self._workers.discard(worker)
 
     async def _spawn(self) -> Worker:
@@ -212,12 +212,12 @@ class Supervisor:
             await worker.wait_until_ready()
         except (WorkerGone, OSError) as error:  # of which TimeoutError is one
             why = str(error) or f"it was not ready within {SPAWN_SECONDS:g} s"
-            await self.release(worker, "it did not start")
+            await self.release_worker(worker, "it did not start")
             raise WorkerGone(f"a worker did not start: {why}") from None
         self.preparing = False
         return worker
 
-    async def _fill(self) -> None:
+    async def _fill_spares(self) -> None:
         async with self._filling:
             self._spares = [w for w in self._spares if not w.gone]
             told = False
@@ -230,18 +230,18 @@ class Supervisor:
                     told = True
                     await asyncio.sleep(RETRY_SECONDS)
 
-    async def _watch(self) -> None:
+    async def _watch_workers(self) -> None:
         while True:
             await self.clock.tick()
             for worker in tuple(self._workers):
                 if worker.gone:
                     self._workers.discard(worker)
                     if worker in self._spares:
-                        self._tasks.spawn(self._fill())
-                elif worker.port and worker.silence > self._settings.hang_seconds:
+                        self._tasks.spawn(self._fill_spares())
+                elif worker.port and worker.seconds_silent > self._settings.hang_seconds:
                     seconds = self._settings.hang_seconds
                     reason = f"it stopped answering for {seconds:g} s and was ended"
-                    self._tasks.spawn(self.release(worker, reason))
+                    self._tasks.spawn(self.release_worker(worker, reason))
 
 
 def _describe_exit(exitcode: int | None) -> str:

@@ -15,9 +15,9 @@ from labs.scene import Color
 from labs.shapes import Body, Vector3
 from server import meshes
 from server.boards import CellsNode, SurfaceNode, cell_corners
-from server.camera import CORNERS, Cameras
+from server.camera import BALL_CORNERS, Cameras
 from server.handles import HandleNode
-from server.labels import LabelNode, arrange_nodes
+from server.labels import LabelNode, place_labels
 from server.mailbox import Mailbox
 from server.messages import View
 from server.node_table import NodeTable
@@ -30,7 +30,7 @@ from server.nodes import (
     blend_with_background,
 )
 from server.polygons import PolygonNode, padded_count
-from server.surroundings import show_surroundings
+from server.scene_setup import configure_scene
 
 TRAIL_EVERY = 3
 """Frames between two updates of a trail or of many arrows: they are long messages."""
@@ -57,7 +57,7 @@ class ViserScene:
         self._view = view
         self._nodes.clear()
         self._frame = 0
-        show_surroundings(self._server, view)
+        configure_scene(self._server, view)
 
     def draw(self, world: World) -> None:
         """One frame of a lab, to whoever looks."""
@@ -66,24 +66,24 @@ class ViserScene:
         # One window a frame, sent at once: by itself Viser collects messages for 17 ms.
         with self._server.atomic():
             world.lab.draw(self, world.params, world.state)
-            drawn = self._nodes.show_drawn()
+            drawn = self._nodes.end_frame()
             shown = [node.appearance for node in drawn if isinstance(node, ArmNode | CellsNode)]
             held = any(node.held for node in drawn if isinstance(node, HandleNode))
             self._cameras.follow(changed=[world.runs, *shown] != self._shown, held=held)
             if self._frame % LABELS_EVERY == 0:
-                arrange_nodes(drawn, self._cameras)
+                place_labels(drawn, self._cameras)
         self._server.flush()
         self._shown = [world.runs, *shown]
         self._frame += 1
 
     def reset_view(self) -> None:
         """Looks as if nobody had moved a camera."""
-        self._cameras.release()
+        self._cameras.reset()
 
     # What a lab draws -----------------------------------------------------------------------
 
     def camera(self, position: ArrayLike, look_at: ArrayLike, core: ArrayLike = ()) -> None:
-        self._cameras.look(position, look_at, core)
+        self._cameras.set_home_view(position, look_at, core)
 
     def arm(
         self,
@@ -99,12 +99,12 @@ class ViserScene:
             name, appearance, lambda path: ArmNode(self._server, path, arm, ghost, self._view)
         )
         assert isinstance(node, ArmNode)
-        node.move(q)
-        outline = node.outline()
-        self._cameras.see(outline)
-        self._cameras.avoid(outline)
+        node.set_configuration(q)
+        outline = node.outline_points()
+        self._cameras.include_points(outline)
+        self._cameras.add_obstacles(outline)
         if effort is not None:
-            node.rings(effort)
+            node.mark_torque_limits(effort)
 
     def trail(
         self, name: str, points: np.ndarray, color: Color = "actual", strength: float = 1.0
@@ -114,24 +114,24 @@ class ViserScene:
             return
         segments = pairs.reshape(-1, 2, 3).astype(np.float32)
         mixed = blend_with_background(color, strength, self._view.dark)
-        node = self._lines(name, segments, mixed, 2.5)
+        node = self._line_node(name, segments, mixed, 2.5)
         if color != "muted":
-            self._cameras.see(points.reshape(-1, 3))
+            self._cameras.include_points(points.reshape(-1, 3))
         if self._frame % TRAIL_EVERY == 0:
-            node.send("points", segments)
+            node.set_property("points", segments)
 
     def arrow(self, name: str, start: ArrayLike, end: ArrayLike, color: Color = "force") -> None:
-        points = np.array([[_three(start), _three(end)]], np.float32)
+        points = np.array([[_to_tuple(start), _to_tuple(end)]], np.float32)
 
-        self._arrows(name, points, color, 0.07).send("points", points)
-        self._cameras.see(points)
+        self._arrow_node(name, points, color, 0.07).set_property("points", points)
+        self._cameras.include_points(points)
 
     def sphere(self, name: str, center: ArrayLike, radius: float, color: Color = "actual") -> None:
         def make(path: str) -> Node:
             return Node(self._server.scene.add_icosphere(path, radius, color=COLORS[color]))
 
-        self._nodes.node(name, (radius, color), make).place(np.asarray(center))
-        self._cameras.see_ball(center, radius)
+        self._nodes.node(name, (radius, color), make).set_position(np.asarray(center))
+        self._cameras.include_ball(center, radius)
 
     def frame(self, name: str, placement: pin.SE3, length: float = 0.15) -> None:
         def make(path: str) -> Node:
@@ -142,9 +142,9 @@ class ViserScene:
             )
 
         node = self._nodes.node(name, length, make)
-        node.place(placement.translation)
-        node.turn(pin.SE3ToXYZQUAT(placement)[[6, 3, 4, 5]])
-        self._cameras.see(placement.translation + length * placement.rotation.T)
+        node.set_position(placement.translation)
+        node.set_orientation(pin.SE3ToXYZQUAT(placement)[[6, 3, 4, 5]])
+        self._cameras.include_points(placement.translation + length * placement.rotation.T)
 
     def arc(
         self,
@@ -157,18 +157,18 @@ class ViserScene:
     ) -> None:
         segments = meshes.arc_with_head(np.asarray(center), np.asarray(axis), angle, radius)
 
-        node = self._lines(name, segments, np.array(COLORS[color], np.uint8), 4.0)
-        node.send("points", segments)
-        self._cameras.see(segments)
+        node = self._line_node(name, segments, np.array(COLORS[color], np.uint8), 4.0)
+        node.set_property("points", segments)
+        self._cameras.include_points(segments)
 
     def ellipsoid(
         self, name: str, center: ArrayLike, axes: np.ndarray, color: Color = "actual"
     ) -> None:
         node = self._nodes.node(name, color, lambda path: EllipsoidNode(self._server, path, color))
         assert isinstance(node, EllipsoidNode)
-        node.stretch(axes)
-        node.place(np.asarray(center))
-        self._cameras.see(np.asarray(center) + np.concatenate([axes.T, -axes.T]))
+        node.set_axes(axes)
+        node.set_position(np.asarray(center))
+        self._cameras.include_points(np.asarray(center) + np.concatenate([axes.T, -axes.T]))
 
     def handle(self, name: str, position: ArrayLike, radius: float = 0.05) -> None:
         def make(path: str) -> Node:
@@ -177,16 +177,16 @@ class ViserScene:
         node = self._nodes.node(name, radius, make)
         assert isinstance(node, HandleNode)
         point = np.asarray(position, float)
-        node.place(point)
-        shown = node.keep_reachable(self._cameras.metres_per_pixel(point))
-        self._cameras.see_ball(point, radius)
-        self._cameras.avoid(point + shown * CORNERS)
+        node.set_position(point)
+        shown = node.scale_to_screen(self._cameras.metres_per_pixel(point))
+        self._cameras.include_ball(point, radius)
+        self._cameras.add_obstacles(point + shown * BALL_CORNERS)
 
     def label(self, name: str, text: str, position: ArrayLike) -> None:
         node = self._nodes.node(name, "label", lambda path: LabelNode(self._server, path, text))
         assert isinstance(node, LabelNode)
-        node.write(text, np.asarray(position, float))
-        self._cameras.see_label(node.point, text)
+        node.set_text(text, np.asarray(position, float))
+        self._cameras.include_label(node.point, text)
 
     def cells(
         self,
@@ -197,7 +197,7 @@ class ViserScene:
         *,
         clickable: bool = True,
     ) -> None:
-        corner = _three(origin)
+        corner = _to_tuple(origin)
 
         def clicked(point: tuple[float, float, float]) -> None:
             self._mailbox.put("hold", handle=name, point=point)
@@ -209,8 +209,8 @@ class ViserScene:
 
         node = self._nodes.node(name, (corner, size, colors.shape, clickable), make)
         assert isinstance(node, CellsNode)
-        node.paint(colors)
-        self._cameras.see(cell_corners(corner, size, *colors.shape[:2]))
+        node.set_colors(colors)
+        self._cameras.include_points(cell_corners(corner, size, *colors.shape[:2]))
 
     def surface(self, name: str, points: np.ndarray, colors: np.ndarray) -> None:
         def make(path: str) -> Node:
@@ -219,7 +219,7 @@ class ViserScene:
         node = self._nodes.node(name, "surface", make)
         assert isinstance(node, SurfaceNode)
         node.draw(points, colors)
-        self._cameras.see(points)
+        self._cameras.include_points(points)
 
     def arrows(
         self, name: str, starts: np.ndarray, ends: np.ndarray, color: Color = "force"
@@ -231,10 +231,10 @@ class ViserScene:
         # A head by steps of its size: the longest arrow may change a little each frame.
         head = 0.35 * 1.25 ** round(math.log(float(lengths.max()), 1.25))
 
-        node = self._arrows(name, points, color, head)
-        self._cameras.see(points)
+        node = self._arrow_node(name, points, color, head)
+        self._cameras.include_points(points)
         if self._frame % TRAIL_EVERY == 0:
-            node.send("points", points)
+            node.set_property("points", points)
 
     def polygon(
         self,
@@ -249,7 +249,7 @@ class ViserScene:
         node = self._nodes.node(name, (color, opacity, padded_count(corners)), make)
         assert isinstance(node, PolygonNode)
         node.draw(corners)
-        self._cameras.see(corners)
+        self._cameras.include_points(corners)
 
     def dots(
         self, name: str, centers: np.ndarray, diameter: float, color: Color = "actual"
@@ -259,12 +259,14 @@ class ViserScene:
         node = self._nodes.node(
             name, (diameter, color), lambda path: DotsNode(self._server, path, diameter, color)
         )
-        node.send("points", centers.astype(np.float32))
-        self._cameras.see(centers)
+        node.set_property("points", centers.astype(np.float32))
+        self._cameras.include_points(centers)
 
     # Nodes ----------------------------------------------------------------------------------
 
-    def _lines(self, name: str, segments: np.ndarray, color: np.ndarray, thickness: float) -> Node:
+    def _line_node(
+        self, name: str, segments: np.ndarray, color: np.ndarray, thickness: float
+    ) -> Node:
         def make(path: str) -> Node:
             return Node(
                 self._server.scene.add_line_segments(
@@ -273,10 +275,10 @@ class ViserScene:
             )
 
         node = self._nodes.node(name, thickness, make)
-        node.send("colors", color)
+        node.set_property("colors", color)
         return node
 
-    def _arrows(self, name: str, points: np.ndarray, color: Color, head: float) -> Node:
+    def _arrow_node(self, name: str, points: np.ndarray, color: Color, head: float) -> Node:
         def make(path: str) -> Node:
             return Node(
                 self._server.scene.add_arrows(
@@ -292,6 +294,6 @@ class ViserScene:
         return self._nodes.node(name, (color, head), make)
 
 
-def _three(point: ArrayLike) -> tuple[float, float, float]:
+def _to_tuple(point: ArrayLike) -> tuple[float, float, float]:
     x, y, z = np.asarray(point, float)
     return (float(x), float(y), float(z))

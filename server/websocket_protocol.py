@@ -9,13 +9,13 @@ from websockets.http11 import Response
 from websockets.server import ServerProtocol
 from websockets.typing import StatusLike
 
-from server.guard import HEADERS
+from server.guard import SECURITY_HEADERS
 
 
 class _Handshake(ServerProtocol):
     def reject(self, status: StatusLike, text: str) -> Response:
         response = super().reject(status, text)
-        response.headers.update(HEADERS)
+        response.headers.update(SECURITY_HEADERS)
         return response
 
 

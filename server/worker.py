@@ -6,9 +6,9 @@ import socket
 import threading
 from typing import Any
 
-from server.live import LiveSession
+from server.live_session import LiveSession
 from server.mailbox import Mailbox
-from server.pipe import CONTROL, Link
+from server.pipe import CONTROL, WorkerPipe
 from server.process import die_with_parent, viser_server
 
 HEARTBEAT = 0.5
@@ -19,7 +19,7 @@ def main(sock: socket.socket) -> None:
     """Runs until the web process closes the pipe."""
     die_with_parent()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    link, mailbox = Link(sock), Mailbox()
+    link, mailbox = WorkerPipe(sock), Mailbox()
     threading.Thread(target=_listen, args=(link, mailbox), daemon=True).start()
     server = viser_server()
     try:
@@ -30,14 +30,14 @@ def main(sock: socket.socket) -> None:
         os._exit(0)  # The web process is gone: nobody is left to hear.
 
 
-def _listen(link: Link, mailbox: Mailbox) -> None:
+def _listen(link: WorkerPipe, mailbox: Mailbox) -> None:
     while (message := link.receive()) is not None:
         mailbox.put(message["do"], message.get("ref"), **message.get("with", {}))
     # The web process is gone or wants us gone; the loop may be hung, so do not ask it.
     os._exit(0)
 
 
-def _wait_for_opening(link: Link, mailbox: Mailbox) -> dict[str, Any]:
+def _wait_for_opening(link: WorkerPipe, mailbox: Mailbox) -> dict[str, Any]:
     while not (items := mailbox.take(HEARTBEAT)):
         link.send(CONTROL, {"idle": True})
     opening = items[0]

@@ -13,7 +13,7 @@ ARGUMENTS = [
 ]
 
 
-def find() -> str | None:
+def find_browser() -> str | None:
     """The path of the browser; None where there is none. The one without a window of its own, where
     it is installed, is half the work to start."""
     names = ("chromium-headless-shell", "chromium", "chromium-browser")

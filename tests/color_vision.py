@@ -37,27 +37,29 @@ VISIONS: Mapping[str, np.ndarray] = {
 }
 
 
-def linear(srgb: np.ndarray) -> np.ndarray:
+def to_linear(srgb: np.ndarray) -> np.ndarray:
     """Light intensities (..., 3) of sRGB colours (..., 3) in [0, 1]."""
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
-def seen(srgb: np.ndarray, vision: str) -> np.ndarray:
+def simulate_vision(srgb: np.ndarray, vision: str) -> np.ndarray:
     """sRGB colours (..., 3) as they look to this vision."""
-    light = np.clip(linear(srgb) @ VISIONS[vision].T, 0.0, 1.0)
+    light = np.clip(to_linear(srgb) @ VISIONS[vision].T, 0.0, 1.0)
     curved = 1.055 * np.maximum(light, 1e-9) ** (1 / 2.4) - 0.055
     return np.asarray(np.where(light <= 0.0031308, 12.92 * light, curved))
 
 
-def distances(colors: Mapping[str, Sequence[float]]) -> Iterator[tuple[float, str]]:
+def color_distances(colors: Mapping[str, Sequence[float]]) -> Iterator[tuple[float, str]]:
     """Of every two named sRGB colours under every vision, with what it is of."""
     for vision in VISIONS:
-        places = {n: 100 * to_oklab(seen(np.array(c), vision)) for n, c in colors.items()}
+        places = {
+            n: 100 * to_oklab(simulate_vision(np.array(c), vision)) for n, c in colors.items()
+        }
         for a, b in combinations(places, 2):
             yield float(np.linalg.norm(places[a] - places[b])), f"{a} and {b}, {vision}"
 
 
-def contrast(a: Sequence[float], b: Sequence[float]) -> float:
+def contrast_ratio(a: Sequence[float], b: Sequence[float]) -> float:
     """The ratio of luminances of WCAG 2, from 1 to 21."""
-    low, high = sorted(float(linear(np.array(c)) @ [0.2126, 0.7152, 0.0722]) for c in (a, b))
+    low, high = sorted(float(to_linear(np.array(c)) @ [0.2126, 0.7152, 0.0722]) for c in (a, b))
     return (high + 0.05) / (low + 0.05)

@@ -18,7 +18,7 @@ import pytest
 from xdist.scheduler import LoadScopeScheduling
 
 import labs  # noqa: F401  (before NumPy: it says how many threads BLAS gets)
-from tests.served import Served, until
+from tests.server_process import ServerProcess, wait_until
 
 ORDER = (
     "browser/test_every_lab.py",
@@ -29,7 +29,7 @@ ORDER = (
     "",
 )
 """What begins first: the longest pieces."""
-OF_A_LAB = re.compile(
+LAB_TEST = re.compile(
     r"labs/(?:test_(?:contract|live_sessions)\.py::\w+\[([a-z0-9-]+)(?:: .*)?\]$|\w+/(\w+)/test_)"
 )
 """A test of all labs that names this one, or a test in its own folder."""
@@ -46,13 +46,13 @@ def pytest_xdist_setupnodes() -> None:
     from labs.engine.catalog import catalog
 
     with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
-        list(pool.map(_prepare, reversed(catalog())))
+        list(pool.map(_compile_lab, reversed(catalog())))
 
 
-def _prepare(slug: str) -> None:
-    from labs.engine.catalog import find
+def _compile_lab(slug: str) -> None:
+    from labs.engine.catalog import find_lab
 
-    find(slug).lab.prepare()
+    find_lab(slug).lab.prepare()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
@@ -60,18 +60,18 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
     def place(item: pytest.Item) -> tuple[int, str]:
         name = item.nodeid.removeprefix("tests/")
-        return next(i for i, x in enumerate(ORDER) if name.startswith(x)), _lab(name)
+        return next(i for i, x in enumerate(ORDER) if name.startswith(x)), _lab_of_test(name)
 
     items.sort(key=place)
 
 
-def _lab(nodeid: str) -> str:
+def _lab_of_test(nodeid: str) -> str:
     """The lab that a test looks at, if it is one."""
-    found = OF_A_LAB.match(nodeid)
+    found = LAB_TEST.match(nodeid)
     return next(filter(None, found.groups())).replace("_", "-") if found else ""
 
 
-class Lanes(LoadScopeScheduling):  # type: ignore[misc]
+class LaneScheduler(LoadScopeScheduling):  # type: ignore[misc]
     """What stays together in one lane: all tests of the server; almost all of the browser, for an
     open page takes a core's time for as long as it is open, and two at once take longer than one
     after the other; those of a lab, which share runs of its solver; else those of a file."""
@@ -80,14 +80,14 @@ class Lanes(LoadScopeScheduling):  # type: ignore[misc]
         nodeid = nodeid.removeprefix("tests/")
         path = nodeid.partition("::")[0]
         folder = path.partition("/")[0]
-        if path in ("browser/test_comeback.py", "browser/test_prefix.py"):
+        if path in ("browser/test_recovery.py", "browser/test_prefix.py"):
             return "server"  # they start and end servers as those tests do
-        return _lab(nodeid) or (path if folder == "labs" else folder)
+        return _lab_of_test(nodeid) or (path if folder == "labs" else folder)
 
 
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Lanes:
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> LaneScheduler:
     """In place of xdist's groups, which this pytest's ids have no place for."""
-    return Lanes(config, log)
+    return LaneScheduler(config, log)
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
@@ -99,33 +99,38 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 
 @pytest.fixture(scope="session")
-def served() -> Iterator[Served]:
+def shared_server() -> Iterator[ServerProcess]:
     """A server for all tests that leave it as they found it."""
-    with Served(ORCLAB_MAX_SESSIONS="12", ORCLAB_HANG_SECONDS="3") as server:
+    with ServerProcess(ORCLAB_MAX_SESSIONS="12", ORCLAB_HANG_SECONDS="3") as server:
         yield server
 
 
 @pytest.fixture(scope="session")
-def impatient() -> Iterator[Served]:
+def short_timeout_server() -> Iterator[ServerProcess]:
     """A server that soon ends what nobody watches, or nobody touches."""
-    with Served(ORCLAB_VIEWERLESS_SECONDS="3", ORCLAB_UNTOUCHED_SECONDS="5") as server:
+    with ServerProcess(ORCLAB_VIEWERLESS_SECONDS="3", ORCLAB_UNTOUCHED_SECONDS="5") as server:
         yield server
 
 
 @pytest.fixture(scope="session")
-def _mortal(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+def _single_place_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServerProcess]:
     with (
         (tmp_path_factory.mktemp("mortal") / "stderr").open("w+") as stderr,
-        Served(stderr=stderr, ORCLAB_MAX_SESSIONS="1") as server,
+        ServerProcess(stderr=stderr, ORCLAB_MAX_SESSIONS="1") as server,
     ):
         yield server
 
 
 @pytest.fixture
-def mortal(_mortal: Served) -> Served:
+def single_place_server(_single_place_server: ServerProcess) -> ServerProcess:
     """A server with a single place, for tests that fill or end it, or start it anew; each finds it
     running."""
-    if not _mortal.running:
-        _mortal.start()
-    until(lambda: _mortal.health()["spares"] == 1 and _mortal.health()["sessions"] == 0)
-    return _mortal
+    if not _single_place_server.running:
+        _single_place_server.start()
+    wait_until(
+        lambda: (
+            _single_place_server.health()["spares"] == 1
+            and _single_place_server.health()["sessions"] == 0
+        )
+    )
+    return _single_place_server

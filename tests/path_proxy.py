@@ -6,7 +6,7 @@ import threading
 from collections.abc import Iterator
 from urllib.parse import urlsplit
 
-STRAY = b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
+NOT_FOUND = b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
 
 
 class PathProxy:
@@ -46,7 +46,7 @@ class PathProxy:
                 await asyncio.gather(_relay(reader, there[1]), _relay(there[0], writer))
             else:
                 self.stray.append(target)
-                writer.write(STRAY)
+                writer.write(NOT_FOUND)
         writer.close()
 
 

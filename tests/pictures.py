@@ -10,9 +10,9 @@ from urllib.parse import urlencode
 from PIL import Image
 from playwright.sync_api import Page, ViewportSize, sync_playwright
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from tests import chromium
-from tests.served import Served
+from tests.server_process import ServerProcess
 
 CARD, PANEL = (640, 400), 40
 """[px] size of a card's picture; width of the strip beside the scene."""
@@ -32,9 +32,9 @@ def main() -> None:
     parser.add_argument("--page", action="store_true", help="the whole page, for the README")
     options = parser.parse_args()
     query = dict(text.split("=", 1) for text in options.params)
-    with Served() as server, sync_playwright() as playwright:
+    with ServerProcess() as server, sync_playwright() as playwright:
         browser = playwright.chromium.launch(
-            executable_path=chromium.find(), args=chromium.ARGUMENTS
+            executable_path=chromium.find_browser(), args=chromium.ARGUMENTS
         )
         page = browser.new_page(viewport=WINDOW if options.page else CARD_WINDOW)
         page.add_init_script("localStorage.setItem('graphics', 'high')")
@@ -44,7 +44,7 @@ def main() -> None:
         _run_to(page, options.seconds)
         if options.page:
             target = Path("docs") / f"{options.lab}.webp"
-            image = _shot(page).resize((1152, 720), Image.Resampling.LANCZOS)
+            image = _screenshot(page).resize((1152, 720), Image.Resampling.LANCZOS)
         else:
             target = _beside_article(options.lab)
             page.evaluate("document.querySelector('#robot').requestFullscreen()")
@@ -52,7 +52,7 @@ def main() -> None:
             scene = next(frame for frame in page.frames if "/scene/" in frame.url)
             scene.locator(FOLD).first.dispatch_event("click")  # open in full screen
             page.wait_for_timeout(4000)
-            image = _card(_shot(page))
+            image = _card_picture(_screenshot(page))
         image.save(target, quality=72, method=6)
         print(f"{target}: {target.stat().st_size / 1024:.0f} KB")
         browser.close()
@@ -71,11 +71,11 @@ def _run_to(page: Page, seconds: float) -> None:
     page.wait_for_timeout(3000)
 
 
-def _shot(page: Page) -> Image.Image:
+def _screenshot(page: Page) -> Image.Image:
     return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
 
 
-def _card(shot: Image.Image) -> Image.Image:
+def _card_picture(shot: Image.Image) -> Image.Image:
     """The scene without its panel, in a card's proportions."""
     width, height = shot.width - PANEL, shot.height
     scale = min(width / CARD[0], height / CARD[1])
@@ -86,7 +86,7 @@ def _card(shot: Image.Image) -> Image.Image:
 
 
 def _beside_article(slug: str) -> Path:
-    return find(slug).folder / "card.webp"
+    return find_lab(slug).folder / "card.webp"
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from labs.engine.catalog import catalog
-from labs.engine.headless import run
+from labs.engine.headless import run_headless
 from labs.engine.record import versions
 from server.cli import main
 
@@ -59,7 +59,7 @@ def orclab(capsys: pytest.CaptureFixture[str]) -> Orclab:
     return call
 
 
-def the_object(result: Result) -> dict[str, Any]:
+def printed_object(result: Result) -> dict[str, Any]:
     """The one JSON object on standard output, with nothing before or after it."""
     assert result.returncode == 0, result.stderr
     assert result.stdout.count("\n") == 1
@@ -67,7 +67,7 @@ def the_object(result: Result) -> dict[str, Any]:
     return data
 
 
-def the_refusal(result: Result) -> str:
+def printed_error(result: Result) -> str:
     """The sentence on standard error with which the command refused."""
     assert result.returncode == 2, result.stderr
     assert result.stdout == ""
@@ -104,16 +104,16 @@ def test_help_names_every_command(orclab: Orclab) -> None:
 
 def test_run_prints_the_final_measurements() -> None:
     result = own_process("run", "joint-control", "--set", "kp=500", "--seconds", "0.5")
-    data = the_object(result)
+    data = printed_object(result)
     assert (data["lab"], data["seed"], data["t"], data["trouble"]) == ("joint-control", 0, 0.5, "")
-    world = run("joint-control", {"kp": 500.0}, seconds=0.5)
+    world = run_headless("joint-control", {"kp": 500.0}, seconds=0.5)
     for name, value in world.lab.measure(world.params, world.state).items():
         assert data[name] == (value.tolist() if isinstance(value, np.ndarray) else value)
     assert result.stderr == ""
 
 
 def test_the_default_is_ten_seconds(orclab: Orclab) -> None:
-    assert the_object(orclab("run", "oscillator"))["t"] == 10.0
+    assert printed_object(orclab("run", "oscillator"))["t"] == 10.0
 
 
 def test_changes_presses_and_drags_happen_at_their_times(orclab: Orclab) -> None:
@@ -121,7 +121,7 @@ def test_changes_presses_and_drags_happen_at_their_times(orclab: Orclab) -> None
         "run oscillator --seconds 1 --set noisy=false --at 0.2 omega=5 --at 0.3 press=kick "
         "--at 0.4 hold=pull:0.5,0,0 --at 0.5 guess=16"
     )
-    data = the_object(orclab(*line.split()))
+    data = printed_object(orclab(*line.split()))
     assert (data["kicks"], data["pulled"]) == (1.0, 0.5)
     assert data["root"] == pytest.approx(4.0, rel=1e-12)
     assert data["x"] == pytest.approx(np.cos(5.0), rel=1e-12)
@@ -129,7 +129,7 @@ def test_changes_presses_and_drags_happen_at_their_times(orclab: Orclab) -> None
 
 def test_trouble_is_a_result_and_a_sentence(orclab: Orclab) -> None:
     result = orclab("run", "troublesome", "--set", "fault=trouble")
-    data = the_object(result)
+    data = printed_object(result)
     assert data["trouble"] == "It diverged at once: choose another fault."
     assert data["trouble"] in result.stderr
     assert data["t"] == 0.01
@@ -137,14 +137,14 @@ def test_trouble_is_a_result_and_a_sentence(orclab: Orclab) -> None:
 
 def test_the_solvers_last_sentence_is_printed_once_there_is_one(orclab: Orclab) -> None:
     line = "run descent --set many=5 --seconds 0"
-    assert the_object(orclab(*line.split()))["solver"] == "5 steps done."
-    assert the_object(orclab(*line.split(), "--at", "0", "iterate=3"))["solver"] is None
-    assert the_object(orclab("run", "troublesome", "--seconds", "0"))["solver"] is None
+    assert printed_object(orclab(*line.split()))["solver"] == "5 steps done."
+    assert printed_object(orclab(*line.split(), "--at", "0", "iterate=3"))["solver"] is None
+    assert printed_object(orclab("run", "troublesome", "--seconds", "0"))["solver"] is None
 
 
 def test_a_diverged_arm_prints_finite_numbers_only(orclab: Orclab) -> None:
     line = "run joint-control --set kd=0 --set integrator=explicit-euler --set kp=2000"
-    data = the_object(orclab(*line.split(), "--set", "torque_limits=off"))
+    data = printed_object(orclab(*line.split(), "--set", "torque_limits=off"))
     assert data["trouble"].startswith("Diverged at t = ")
 
 
@@ -153,7 +153,7 @@ def test_the_three_forms_hold_the_same_run(orclab: Orclab, tmp_path: Path) -> No
         path = tmp_path / f"run.{form}"
         line = "run oscillator --seconds 1 --seed 3 --set noisy=true"
         result = orclab(*line.split(), "--out", path)
-        assert the_object(result)["seed"] == 3
+        assert printed_object(result)["seed"] == 3
         assert result.stderr.startswith(f"wrote {path}\n")
     beside = json.loads((tmp_path / "run.about.json").read_text())
     data = json.loads((tmp_path / "run.json").read_text())
@@ -185,30 +185,30 @@ def test_a_replay_is_the_run_again(orclab: Orclab, tmp_path: Path) -> None:
     line = "run joint-control --set noise=0.01 --seconds 0.6 --seed 3 --at 0.2 press=push"
     one = orclab(*line.split(), "--at", "0.3", "kp=900", "--out", first)
     two = orclab("run", "--replay", first, "--out", second)
-    assert the_object(one) == the_object(two)
+    assert printed_object(one) == printed_object(two)
     assert first.read_bytes() == second.read_bytes()
 
 
 def test_a_replay_can_go_on_for_longer(orclab: Orclab, tmp_path: Path) -> None:
     path = tmp_path / "run.json"
     assert orclab("run", "oscillator", "--seconds", 1, "--out", path).returncode == 0
-    assert the_object(orclab("run", "--replay", path, "--seconds", 2))["t"] == 2.0
+    assert printed_object(orclab("run", "--replay", path, "--seconds", 2))["t"] == 2.0
 
 
 # Wrong use ------------------------------------------------------------------------------------
 
 
-Refusing = Callable[..., str]
+RefusedCall = Callable[..., str]
 
 
 @pytest.fixture
-def refused(orclab: Orclab) -> Refusing:
+def refused(orclab: Orclab) -> RefusedCall:
     """Calls the command; the sentence with which it refuses."""
-    return lambda *arguments: the_refusal(orclab(*arguments))
+    return lambda *arguments: printed_error(orclab(*arguments))
 
 
 def test_wrong_use_ends_the_process_with_2_and_no_traceback() -> None:
-    assert the_refusal(own_process("run", "nope")).startswith("orclab: no lab is named 'nope'")
+    assert printed_error(own_process("run", "nope")).startswith("orclab: no lab is named 'nope'")
 
 
 @pytest.mark.parametrize(
@@ -250,7 +250,9 @@ def test_wrong_use_ends_the_process_with_2_and_no_traceback() -> None:
         ("--host 256.0.0.1", "cannot listen on 256.0.0.1"),
     ],
 )
-def test_wrong_use_is_refused_with_a_sentence(refused: Refusing, line: str, sentence: str) -> None:
+def test_wrong_use_is_refused_with_a_sentence(
+    refused: RefusedCall, line: str, sentence: str
+) -> None:
     assert sentence in refused(*line.split())
 
 
@@ -270,9 +272,9 @@ def test_wrong_use_is_refused_with_a_sentence(refused: Refusing, line: str, sent
     ],
 )
 def test_a_damaged_export_is_refused(
-    refused: Refusing, tmp_path: Path, change: dict[str, Any], sentence: str
+    refused: RefusedCall, tmp_path: Path, change: dict[str, Any], sentence: str
 ) -> None:
-    data = json.loads(run("oscillator", seconds=0.1).recording().json())
+    data = json.loads(run_headless("oscillator", seconds=0.1).recording().json())
     path = tmp_path / "run.json"
     path.write_text(json.dumps(data | change))
     assert sentence in refused("run", "--replay", path)
@@ -280,20 +282,20 @@ def test_a_damaged_export_is_refused(
 
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b"5", b"\xff\xfe", b'{"lab": "oscillator"}'])
 def test_a_file_that_is_no_export_is_refused(
-    refused: Refusing, tmp_path: Path, content: bytes
+    refused: RefusedCall, tmp_path: Path, content: bytes
 ) -> None:
     path = tmp_path / "run.json"
     path.write_bytes(content)
     assert "not a JSON export of orclab" in refused("run", "--replay", path)
 
 
-def test_a_file_that_cannot_be_written_is_refused(refused: Refusing, tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_written_is_refused(refused: RefusedCall, tmp_path: Path) -> None:
     (tmp_path / "run.json").mkdir()
     sentence = refused("run", "oscillator", "--seconds", 0, "--out", tmp_path / "run.json")
     assert "Is a directory" in sentence
 
 
-def test_a_taken_port_is_refused_with_what_to_do(refused: Refusing) -> None:
+def test_a_taken_port_is_refused_with_what_to_do(refused: RefusedCall) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         sentence = refused("--port", port)
@@ -311,12 +313,12 @@ def test_a_taken_port_is_refused_with_what_to_do(refused: Refusing) -> None:
     ],
 )
 def test_a_wrong_setting_is_refused_by_name(
-    refused: Refusing, monkeypatch: pytest.MonkeyPatch, variable: str, value: str
+    refused: RefusedCall, monkeypatch: pytest.MonkeyPatch, variable: str, value: str
 ) -> None:
     monkeypatch.setenv(variable, value)
     assert variable in refused()
 
 
 def test_a_course_that_is_not_there_is_refused_by_name() -> None:
-    sentence = the_refusal(own_process("list", ORCLAB_LABS="no_such_course"))
+    sentence = printed_error(own_process("list", ORCLAB_LABS="no_such_course"))
     assert "ORCLAB_LABS names no_such_course" in sentence

@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 from labs.engine.catalog import catalog
-from labs.engine.headless import run
+from labs.engine.headless import run_headless
 from labs.engine.run import World
 from server.articles import render
 from server.cli import main
 from server.settings import Settings
-from tests.labs.contract import check, extremes
+from tests.labs.contract import check_world, extreme_values
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -93,13 +93,15 @@ def test_the_lab_of_the_readme_is_a_lab(tmp_path: Path, monkeypatch: pytest.Monk
     catalog.cache_clear()
     try:
         entry = catalog()["spring"]
-        for name, value in extremes(entry):
-            check(run("spring", {name: value}, seconds=2.0))
+        for name, value in extreme_values(entry):
+            check_world(run_headless("spring", {name: value}, seconds=2.0))
         (experiment,) = render(entry).experiments
-        critical = run("spring", experiment.settings, seconds=3.0).recording().channels["x"]
+        critical = (
+            run_headless("spring", experiment.settings, seconds=3.0).recording().channels["x"]
+        )
         assert (critical > -1e-3).all(), "critically damped, it does not swing over"
         assert abs(critical[-1]) < 1e-3
-        check(World(entry))
+        check_world(World(entry))
     finally:
         catalog.cache_clear()
     style = [

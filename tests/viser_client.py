@@ -11,7 +11,7 @@ import msgspec
 import zstandard
 from websockets.sync.client import connect
 
-from tests.served import PATIENCE, Opened
+from tests.server_process import TIMEOUT, SessionClient
 
 PROTOCOL = "viser-v1.1.1"
 
@@ -24,7 +24,7 @@ def decode(window: bytes) -> list[dict[str, Any]]:
     return messages
 
 
-def camera(position: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> bytes:
+def camera_message(position: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> bytes:
     """Where a client looks from; the first makes it count as connected."""
     return message(
         "ViewerCameraMessage",
@@ -48,7 +48,7 @@ class SceneClient:
     """`with SceneClient(session) as scene: scene.set("ω", 0.5)`: controls go by their labels, up to
     the value that a slider's says."""
 
-    def __init__(self, session: Opened) -> None:
+    def __init__(self, session: SessionClient) -> None:
         address = session.server.address.replace("http", "ws") + session.info["scene"].rstrip("/")
         self.socket = connect(
             address,
@@ -62,7 +62,7 @@ class SceneClient:
         self.values: dict[str, Any] = {}  # what is shown, by uuid
         self.nodes: set[str] = set()
         self._unread: deque[dict[str, Any]] = deque()
-        self.socket.send(camera())
+        self.socket.send(camera_message())
         self.read_until(lambda m: m["type"] == "ReplayDoneMessage")
 
     def __enter__(self) -> Self:
@@ -71,7 +71,7 @@ class SceneClient:
     def __exit__(self, *_: object) -> None:
         self.socket.close()
 
-    def messages(self, timeout: float = PATIENCE) -> Iterator[dict[str, Any]]:
+    def messages(self, timeout: float = TIMEOUT) -> Iterator[dict[str, Any]]:
         """All messages as they come, noted. Fails after `timeout` seconds of silence."""
         while True:
             while self._unread:
@@ -83,14 +83,14 @@ class SceneClient:
             self._unread.extend(decode(window))
 
     def read_until(self, true: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + TIMEOUT
         for found in self.messages():
             if true(found):
                 return found
             assert time.monotonic() < end, "no such scene message came"
         raise AssertionError
 
-    def skip(self, seconds: float) -> None:
+    def read_for(self, seconds: float) -> None:
         """Reads on for a while, so that what comes next is new."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0:
@@ -118,14 +118,14 @@ class SceneClient:
         if name not in self.nodes:
             self.read_until(lambda _: name in self.nodes)
 
-    def shows(self, label: str, value: Any) -> None:
-        """Waits until a control shows a value. Fails after `PATIENCE`."""
+    def wait_for_value(self, label: str, value: Any) -> None:
+        """Waits until a control shows a value. Fails after `TIMEOUT`."""
         uuid = self.control(label)
         if self.values[uuid] != value:
             self.read_until(lambda _: self.values[uuid] == value)
 
-    def says(self, label: str, text: str) -> None:
-        """Waits until a control's whole label is `text`. Fails after `PATIENCE`."""
+    def wait_for_label(self, label: str, text: str) -> None:
+        """Waits until a control's whole label is `text`. Fails after `TIMEOUT`."""
         uuid = self.control(label)
         if self.labels[uuid] != text:
             self.read_until(lambda _: self.labels[uuid] == text)

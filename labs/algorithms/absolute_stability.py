@@ -20,7 +20,7 @@ from labs.algorithms.butcher_tableau import Tableau
 ROUNDING = 1e-12
 """A sum whose terms cancel to less than this share of their sizes is zero. Never less than a
 fixed number: the last coefficient of a method of many stages is small and decides its limit."""
-GROWTH = 1e-7
+UNSTABLE_GROWTH = 1e-7
 """A step that makes the state longer by more than this is seen as unstable."""
 
 
@@ -35,11 +35,13 @@ class StabilityFunction:
     def of(cls, tableau: Tableau) -> "StabilityFunction":
         """P is the product of Q and the series R = 1 + sum_k (b^T A^(k-1) 1) z^k, up to z^q. For
         an explicit method Q = 1, and nothing cancels."""
-        q = reversed_characteristic(tableau.a)
+        q = reversed_characteristic_polynomial(tableau.a)
         powers = tableau.stages + 1
-        p = np.convolve(q, _series(tableau.a, tableau.b))[:powers]
-        sizes = np.convolve(np.abs(q), _series(np.abs(tableau.a), np.abs(tableau.b)))[:powers]
-        return cls(_without_rounding(p, sizes), q)
+        p = np.convolve(q, _stability_series(tableau.a, tableau.b))[:powers]
+        sizes = np.convolve(np.abs(q), _stability_series(np.abs(tableau.a), np.abs(tableau.b)))[
+            :powers
+        ]
+        return cls(_trim_rounding(p, sizes), q)
 
     def __call__(self, z: np.ndarray) -> np.ndarray:
         """R at complex z of any shape."""
@@ -47,13 +49,13 @@ class StabilityFunction:
         value: np.ndarray = polynomial(z, self.p) / polynomial(z, self.q)
         return value
 
-    def growth(self, h: np.ndarray, eigenvalues: np.ndarray) -> np.ndarray:
+    def spectral_radius(self, h: np.ndarray, eigenvalues: np.ndarray) -> np.ndarray:
         """max over lambda of |R(h lambda)| for each h (k,) [s]: the spectral radius of a step."""
         value: np.ndarray = np.abs(self(np.outer(h, eigenvalues))).max(axis=1)
         return value
 
 
-def reversed_characteristic(m: np.ndarray) -> np.ndarray:
+def reversed_characteristic_polynomial(m: np.ndarray) -> np.ndarray:
     """Coefficients of det(I - z M) in 1, z, ..., z^n from Newton's identities,
     k c_k = -sum_(j<=k) tr(M^j) c_(k-j): exact for the nilpotent A of explicit methods, where
     eigenvalues would lose half of the digits."""
@@ -62,16 +64,21 @@ def reversed_characteristic(m: np.ndarray) -> np.ndarray:
     sizes = [np.linalg.matrix_power(np.abs(m), k) for k in range(1, n + 1)]
     coefficients, largest = np.eye(n + 1)[0], np.eye(n + 1)[0]
     for k in range(1, n + 1):
-        coefficients[k] = -sum(np.trace(powers[j - 1]) * coefficients[k - j] for j in _to(k)) / k
-        largest[k] = sum(np.trace(sizes[j - 1]) * largest[k - j] for j in _to(k)) / k
-    return _without_rounding(coefficients, largest)
+        coefficients[k] = (
+            -sum(np.trace(powers[j - 1]) * coefficients[k - j] for j in _one_to(k)) / k
+        )
+        largest[k] = sum(np.trace(sizes[j - 1]) * largest[k - j] for j in _one_to(k)) / k
+    return _trim_rounding(coefficients, largest)
 
 
 def largest_stable_step(r: StabilityFunction, eigenvalues: np.ndarray) -> float:
     """The largest h [s] up to which |R(h lambda)| <= 1 for all eigenvalues (m,) [1/s], from the
     zeros of |P|^2 - |Q|^2 on the ray through lambda; infinite when there is no limit, 0 when
     every step is too long, however little it adds."""
-    return min((_along(r, value) for value in eigenvalues if abs(value) > 0.0), default=np.inf)
+    return min(
+        (_largest_step_on_ray(r, value) for value in eigenvalues if abs(value) > 0.0),
+        default=np.inf,
+    )
 
 
 def stability_boundary(r: StabilityFunction, reach: float, points: int = 240) -> np.ndarray:
@@ -85,7 +92,7 @@ def stability_boundary(r: StabilityFunction, reach: float, points: int = 240) ->
     sheets = [np.roots((p - np.exp(1j * angle) * q)[::-1]) for angle in angles]
     edge = [complex(sheets[0][np.argmin(np.abs(sheets[0]))])]
     for roots in [*sheets[1:], sheets[0]] * degree:
-        edge.append(_next(edge, roots))
+        edge.append(_next_root(edge, roots))
         if abs(edge[-1]) > reach:  # the other half is its mirror image
             half = np.array(edge[:-1])
             return np.concatenate([half[::-1].conj(), half])
@@ -94,13 +101,13 @@ def stability_boundary(r: StabilityFunction, reach: float, points: int = 240) ->
     return np.array(edge)
 
 
-def measured_stability_limit(
+def bisect_stability_limit(
     growth: Callable[[float], float], lowest: float, highest: float
 ) -> float:
     """The h at which a method starts to blow up: h is raised from `lowest` by a fifth at a time
     until growth(h), the factor of one step, passes 1, then halved in between. Infinite when it
     does not up to `highest`, 0 when it does from the start."""
-    unstable = 1.0 + GROWTH
+    unstable = 1.0 + UNSTABLE_GROWTH
     low, high = 0.0, lowest
     while growth(high) <= unstable:
         if high >= highest:
@@ -114,7 +121,7 @@ def measured_stability_limit(
     return 0.5 * (low + high)
 
 
-def _along(r: StabilityFunction, eigenvalue: complex) -> float:
+def _largest_step_on_ray(r: StabilityFunction, eigenvalue: complex) -> float:
     """The largest h on one ray, s = h |lambda|: where excess(s) = |P|^2 - |Q|^2 first becomes
     positive. Between two zeros it has one sign; where it only touches zero, rounding may part
     the double one, and what lies between is no more than rounding."""
@@ -134,9 +141,9 @@ def _excess(r: StabilityFunction, direction: complex) -> tuple[np.ndarray, np.nd
     """|P|^2 - |Q|^2 as a polynomial in s > 0 without its zeros at s = 0, trimmed, and the sizes of
     what its coefficients are sums of."""
     subtract, add = np.polynomial.polynomial.polysub, np.polynomial.polynomial.polyadd
-    excess = subtract(_squared(r.p, direction), _squared(r.q, direction))
-    sizes = add(_squared(np.abs(r.p), 1.0), _squared(np.abs(r.q), 1.0))
-    excess = _without_rounding(np.pad(excess, (0, len(sizes) - len(excess))), sizes)
+    excess = subtract(_squared_magnitude(r.p, direction), _squared_magnitude(r.q, direction))
+    sizes = add(_squared_magnitude(np.abs(r.p), 1.0), _squared_magnitude(np.abs(r.q), 1.0))
+    excess = _trim_rounding(np.pad(excess, (0, len(sizes) - len(excess))), sizes)
     lowest = int(np.argmax(excess != 0.0)) if len(excess) else 0
     return excess[lowest:], sizes[lowest : len(excess)]
 
@@ -154,7 +161,7 @@ def _positive_zeros(polynomial: np.ndarray) -> list[float]:
     return sorted(float(unit * value) for value in real if value > 0.0)
 
 
-def _series(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _stability_series(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """(q + 1,) coefficients of 1 + z b^T (I - z A)^-1 1 up to z^q."""
     coefficients, stages = [1.0], np.ones(len(b))
     for _ in range(len(b)):
@@ -163,24 +170,24 @@ def _series(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.array(coefficients)
 
 
-def _without_rounding(sums: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+def _trim_rounding(sums: np.ndarray, sizes: np.ndarray) -> np.ndarray:
     """Coefficients (k,), those zero that are rounding beside the sizes (k,) of their terms,
     without zeros at the end."""
     return np.trim_zeros(np.where(np.abs(sums) > ROUNDING * sizes, sums, 0.0), "b")
 
 
-def _to(k: int) -> range:
+def _one_to(k: int) -> range:
     return range(1, k + 1)
 
 
-def _squared(coefficients: np.ndarray, direction: complex) -> np.ndarray:
+def _squared_magnitude(coefficients: np.ndarray, direction: complex) -> np.ndarray:
     """|P(s direction)|^2 as a real polynomial in s."""
     turned = coefficients * direction ** np.arange(len(coefficients))
     value: np.ndarray = np.convolve(turned, turned.conj()).real
     return value
 
 
-def _next(edge: list[complex], roots: np.ndarray) -> complex:
+def _next_root(edge: list[complex], roots: np.ndarray) -> complex:
     """The root that continues the edge: nearest to where its last two points lead."""
     ahead = 2.0 * edge[-1] - edge[-2] if len(edge) > 1 else edge[-1]
     return complex(roots[np.argmin(np.abs(roots - ahead))])

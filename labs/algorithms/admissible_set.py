@@ -9,21 +9,21 @@ It is O_t* with the first t at which no limit can be broken one step later by a 
 
 There is such a t if A is asymptotically stable, (C, A) observable, and the limits bounded with the
 origin inside. Here the limits are those on x, {x : H C x <= h}; under u = K x, A is A + B K and
-they are X and K x in U (`limits_under`).
+they are X and K x in U (`closed_loop_limits`).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from labs.algorithms.polytopes import support, support_by_programmes
+from labs.algorithms.polytopes import support, support_by_linear_programs
 from labs.errors import LabError
 from labs.problems.polyhedron import Polyhedron
 from labs.resumable import Resumable
 
 TOLERANCE = 1e-9
 """J_i* up to this share of h_i counts as zero."""
-MOST = 300
+MAX_STEPS = 300
 """Steps, before it is said that there is no end in sight."""
 
 
@@ -43,7 +43,7 @@ class AdmissibleSet:
     """Why it stopped, in a sentence; empty while there is more to do."""
 
 
-def limits_under(K: np.ndarray, state_set: Polyhedron, control_set: Polyhedron) -> Polyhedron:
+def closed_loop_limits(K: np.ndarray, state_set: Polyhedron, control_set: Polyhedron) -> Polyhedron:
     """{x in X : K x in U}, of K (m, n)."""
     return state_set.intersection(control_set.preimage(K))
 
@@ -58,33 +58,33 @@ def init(limits: Polyhedron) -> AdmissibleSet:
 def step(A: np.ndarray, limits: Polyhedron, at: AdmissibleSet) -> AdmissibleSet:
     """From O_t to O_(t+1), or to the end: by vertices where that is quicker."""
     later = limits.preimage(np.linalg.matrix_power(A, at.t + 1))
-    return _next(A, limits, at, later, support(at.set, later.H) - later.h)
+    return _next_iterate(A, limits, at, later, support(at.set, later.H) - later.h)
 
 
-def step_in_pieces(
+def resumable_step(
     A: np.ndarray, limits: Polyhedron, at: AdmissibleSet
 ) -> Resumable[AdmissibleSet]:
     """The same as the notes have it: by one linear programme for each J_i*, with pauses."""
     later = limits.preimage(np.linalg.matrix_power(A, at.t + 1))
     J = np.zeros(len(later.h))
     for i in range(len(J)):
-        J[i] = support_by_programmes(at.set, later.H[i : i + 1])[0] - later.h[i]
+        J[i] = support_by_linear_programs(at.set, later.H[i : i + 1])[0] - later.h[i]
         yield
-    return _next(A, limits, at, later, J)
+    return _next_iterate(A, limits, at, later, J)
 
 
-def _next(
+def _next_iterate(
     A: np.ndarray, limits: Polyhedron, at: AdmissibleSet, later: Polyhedron, J: np.ndarray
 ) -> AdmissibleSet:
     cuts = J / np.maximum(1.0, limits.h) > TOLERANCE
     if not cuts.any():
         done = f"t* = {at.t}: a state that meets all limits up to t* meets them for ever"
         return AdmissibleSet(at.t, at.set, J, True, done)
-    if at.t >= MOST:
+    if at.t >= MAX_STEPS:
         radius = float(np.abs(np.linalg.eigvals(A)).max())
         why = f"the spectral radius is {radius:.4g}"
         why += ": make it less than 1" if radius >= 1.0 else ", near 1: it takes longer than this"
-        return AdmissibleSet(at.t, at.set, J, False, f"no t* up to {MOST}: {why}")
+        return AdmissibleSet(at.t, at.set, J, False, f"no t* up to {MAX_STEPS}: {why}")
     cut = Polyhedron(later.H[cuts], later.h[cuts])
     return AdmissibleSet(at.t + 1, at.set.intersection(cut), J)
 

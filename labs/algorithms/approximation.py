@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from labs.algorithms.features import Features, evaluate, values
+from labs.algorithms.features import Features, evaluate, state_values
 from labs.algorithms.linear_prediction import (
     gradient_monte_carlo,
     gradient_oracle,
@@ -36,7 +36,7 @@ from labs.problems.prediction import (
     sample_episode,
     weighted_error,
 )
-from labs.random_numbers import seeded
+from labs.random_numbers import random_states
 
 GRADIENT_MC, SEMI_GRADIENT_TD, SEMI_GRADIENT_N_STEP, SEMI_GRADIENT_LAMBDA, TDC, ORACLE = range(6)
 _OFF_POLICY = (SEMI_GRADIENT_TD, SEMI_GRADIENT_LAMBDA, TDC, ORACLE)
@@ -56,7 +56,7 @@ class LinearPredictors:
     """(S, 4) uint64: the states of their random generators."""
     errors: np.ndarray
     """(S,) weighted error sqrt(sum of weight (v - V)^2); infinite once diverged."""
-    sound: np.ndarray
+    bounded: np.ndarray
     """(S,) bool: False once a weight has left the rule's limit; the learner then stands still,
     with the weights from before that episode."""
 
@@ -72,14 +72,14 @@ def init(
         )
     if features.value[task.task.terminal].any():
         raise LabError("in terminal states all features are 0, as is the value")
-    first = root_mean_square_error(task, values(features, w))
+    first = root_mean_square_error(task, state_values(features, w))
     return LinearPredictors(
         w=np.tile(np.asarray(w, float), (seeds, 1)),
         h=np.zeros((seeds, features.size)),
         count=np.zeros((seeds, 1), np.int64),
-        random=seeded(rng, seeds),
+        random=random_states(rng, seeds),
         errors=np.full(seeds, first),
-        sound=np.ones(seeds, bool),
+        bounded=np.ones(seeds, bool),
     )
 
 
@@ -104,12 +104,12 @@ def step(
         raise LabError(f"n = {rule.n}: takes a whole number from 1")
     arrays = (learners.w, learners.h, learners.count, learners.random, learners.errors)
     w, h, count, random, errors = (array.copy() for array in arrays)
-    sound = learners.sound.copy()
+    sound = learners.bounded.copy()
     _learn(task, features, rule, method, w, h, count, random, errors, sound, episodes)
     return LinearPredictors(w, h, count, random, errors, sound)
 
 
-def mean_update(
+def expected_td_update(
     P: np.ndarray, C: np.ndarray, gamma: float, phi: np.ndarray, mu: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """A (d, d) and b (d,) of TD(0)'s mean step alpha (b - A w), for a chain P (X, X), C (X,) whose
@@ -120,16 +120,16 @@ def mean_update(
 
 def td_fixed_point(A: np.ndarray, b: np.ndarray) -> np.ndarray:
     """w (d,) with A w = b, the shortest of all where features depend on one another."""
-    return shortest_solution(A, b)
+    return minimum_norm_solution(A, b)
 
 
-def best_fit(V: np.ndarray, phi: np.ndarray, mu: np.ndarray) -> np.ndarray:
+def weighted_least_squares(V: np.ndarray, phi: np.ndarray, mu: np.ndarray) -> np.ndarray:
     """w (d,) of the least value error."""
     root = np.sqrt(mu)
-    return shortest_solution(phi * root[:, None], V * root)
+    return minimum_norm_solution(phi * root[:, None], V * root)
 
 
-def shortest_solution(A: np.ndarray, b: np.ndarray) -> np.ndarray:
+def minimum_norm_solution(A: np.ndarray, b: np.ndarray) -> np.ndarray:
     """w (d,) of least |A w - b|, the shortest where there are several. By a QR factorisation that
     reveals the rank: several times as fast as by singular values."""
     rounding = np.finfo(float).eps * max(A.shape)

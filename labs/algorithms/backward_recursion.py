@@ -47,7 +47,9 @@ def iterate(mdp: FiniteMDP, final: np.ndarray, horizon: int) -> Iterator[Stage]:
         yield stage
 
 
-def tables(mdp: FiniteMDP, final: np.ndarray, horizon: int) -> tuple[np.ndarray, np.ndarray]:
+def value_and_policy_tables(
+    mdp: FiniteMDP, final: np.ndarray, horizon: int
+) -> tuple[np.ndarray, np.ndarray]:
     """V (N + 1, X) and policies (N, X), both by the steps left: row k of V belongs to k steps to
     go, and policy[k - 1] is what to do then."""
     stages = list(iterate(mdp, final, horizon))

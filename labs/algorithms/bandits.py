@@ -20,11 +20,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labs.algorithms.exploration import CONFIDENCE, FOLLOW, BehaviourPolicy, choose, confidence
+from labs.algorithms.exploration import (
+    CONFIDENCE_BOUND,
+    FIXED_POLICY,
+    BehaviourPolicy,
+    choose,
+    lower_confidence_bound,
+)
 from labs.compiled import compiled
 from labs.errors import LabError
 from labs.problems.episodes import UpdateRule, step_size
-from labs.random_numbers import normal, seeded
+from labs.random_numbers import normal, random_states
 
 SAMPLE_MEAN = UpdateRule(alpha=1.0, omega=1.0)
 """Estimates are the means of what was paid."""
@@ -59,7 +65,7 @@ class Players:
     """Choices made so far."""
     random: np.ndarray
     """(M, 4) uint64: the states of the players' random generators."""
-    luck: np.ndarray
+    task_random: np.ndarray
     """(M, 4) uint64: those of their tasks."""
     costs: np.ndarray
     """(k,) mean cost of each turn of the last step, over all tasks."""
@@ -92,8 +98,8 @@ def init(bandits: Bandits, rng: np.random.Generator, q0: float = 0.0) -> Players
         largest=nothing,
         regret=nothing,
         turns=0,
-        random=seeded(rng, len(means)),
-        luck=seeded(rng, len(means)),
+        random=random_states(rng, len(means)),
+        task_random=random_states(rng, len(means)),
         costs=none,
         regrets=none,
         best=none,
@@ -110,7 +116,7 @@ def step(
 ) -> Players:
     """The players after so many further turns. With `measured_bound`, L of the confidence bound is
     the largest |l| that a player has met. Raises LabError for a strategy that follows others."""
-    if strategy.kind == FOLLOW:
+    if strategy.kind == FIXED_POLICY:
         raise LabError("a bandit has no other controller to follow")
     if players.q.shape != bandits.means.shape:
         raise LabError(
@@ -119,10 +125,10 @@ def step(
         )
     state = [players.q, players.visits, players.means, players.largest, players.regret]
     q, visits, means, largest, regret = (array.copy() for array in state)
-    random, luck = players.random.copy(), players.luck.copy()
+    random, luck = players.random.copy(), players.task_random.copy()
     costs, regrets, best = np.zeros(turns), np.zeros(turns), np.zeros(turns)
     world = (bandits.deviations, bandits.drift, means, luck)
-    _play(
+    _simulate_turns(
         world,
         strategy,
         rule,
@@ -144,7 +150,7 @@ def step(
         regret=regret,
         turns=players.turns + turns,
         random=random,
-        luck=luck,
+        task_random=luck,
         costs=costs / many,
         regrets=regrets / many,
         best=best / many,
@@ -152,7 +158,7 @@ def step(
 
 
 @compiled
-def _play(
+def _simulate_turns(
     world: tuple[np.ndarray, float, np.ndarray, np.ndarray],
     strategy: BehaviourPolicy,
     rule: UpdateRule,
@@ -166,13 +172,13 @@ def _play(
 ) -> None:
     deviations, drift, means, luck = world
     costs, regrets, best = curves
-    by_bound = measured_bound and strategy.kind == CONFIDENCE
+    by_bound = measured_bound and strategy.kind == CONFIDENCE_BOUND
     for m in range(len(q)):
         mean, mine, its = means[m], random[m], luck[m]
         least = mean.min()
         for t in range(len(costs)):
             if by_bound:
-                u = confidence(q, m, visits, largest[m], mine)
+                u = lower_confidence_bound(q, m, visits, largest[m], mine)
             else:
                 u = choose(strategy, m, q, visits, mine)
             cost = mean[u] + deviations[m, u] * normal(its)

@@ -20,15 +20,15 @@ import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
 
-from labs.algorithms.approximation import shortest_solution
-from labs.algorithms.features import Features, add_features, evaluate, values
+from labs.algorithms.approximation import minimum_norm_solution
+from labs.algorithms.features import Features, add_features, evaluate, state_values
 from labs.algorithms.monte_carlo import costs_to_go
 from labs.compiled import compiled
 from labs.errors import LabError
 from labs.problems.episodes import UpdateRule, step_size
 from labs.problems.prediction import PredictionTask, empty_episode, sample_episode
-from labs.random_numbers import below
-from labs.resumable import Resumable, pieces
+from labs.random_numbers import random_integer
+from labs.resumable import Resumable, split_work
 
 REPLAY_MC, REPLAY_TD = range(2)
 
@@ -86,17 +86,17 @@ def _fit(features: Features, x: np.ndarray, targets: np.ndarray) -> np.ndarray:
     """The same to targets (N,) in the states x (N,). All visits of a state ask for their mean."""
     visits = np.bincount(x, minlength=len(features.active))
     sums = np.bincount(x, targets, minlength=len(visits))
-    if _apart(features):
+    if _one_feature_per_state(features):
         i, phi = features.active[:, 0], features.value[:, 0]
         squares = np.bincount(i, visits * phi**2, minlength=features.size)
         products = np.bincount(i, sums * phi, minlength=features.size)
         return np.divide(products, squares, out=np.zeros(features.size), where=squares > 0.0)
     seen = np.flatnonzero(visits)
     root = np.sqrt(visits[seen])
-    return shortest_solution(features.dense[seen] * root[:, None], sums[seen] / root)
+    return minimum_norm_solution(features.dense[seen] * root[:, None], sums[seen] / root)
 
 
-def _apart(features: Features) -> bool:
+def _one_feature_per_state(features: Features) -> bool:
     """Whether no state has more than one: a table, or groups of states."""
     return bool(features.active.shape[1] == 1)
 
@@ -110,11 +110,11 @@ def lstd(features: Features, batch: TransitionBatch, gamma: float) -> np.ndarray
     cost = np.bincount(batch.x, batch.cost, minlength=states)
     A = phi.T @ (scipy.sparse.diags_array(counts.sum(axis=1)) @ phi - gamma * (counts @ phi))
     b = phi.T @ cost
-    found = _chain_solution(A.tocsc(), b) if few and _apart(features) else None
-    return shortest_solution(A.toarray() if few else A, b) if found is None else found
+    found = _solve_m_matrix(A.tocsc(), b) if few and _one_feature_per_state(features) else None
+    return minimum_norm_solution(A.toarray() if few else A, b) if found is None else found
 
 
-def _chain_solution(A: scipy.sparse.csc_array, b: np.ndarray) -> np.ndarray | None:
+def _solve_m_matrix(A: scipy.sparse.csc_array, b: np.ndarray) -> np.ndarray | None:
     """w (d,) with A w = b, for the sparse A of groups of states: off its diagonal nothing is above
     0, its rows sum to 0 or more, so that A^-1 >= 0 and |A^-1| = max A^-1 1. 0 for groups never met;
     None where A is singular otherwise, or nearly."""
@@ -140,7 +140,7 @@ def fitted_q_iteration(
     """The next w (U, d): for each control a fit to the targets of its own transitions. A control
     that was never tried keeps its weights."""
     fitted = w.copy()
-    targets = batch.cost + gamma * values(features, w).min(axis=0)[batch.y]
+    targets = batch.cost + gamma * state_values(features, w).min(axis=0)[batch.y]
     for u in range(len(w)):
         tried = batch.u == u
         if tried.any():
@@ -164,7 +164,7 @@ def replay(
     `random` (4,) uint64 changes in place. Raises LabError for an empty batch."""
     # v is q of a single control.
     alone, bootstrap = batch._replace(u=np.zeros_like(batch.u)), method == REPLAY_TD
-    after = yield from _replayed(
+    after = yield from _resumable_replay(
         features, alone, gamma, rule, bootstrap, w[None], random, draws, drawn
     )
     return np.asarray(after[0])
@@ -182,10 +182,12 @@ def replay_q_learning(
 ) -> Resumable[np.ndarray]:
     """w (U, d) after so many further updates of Q-learning, as `replay`. It stops short of the
     update after the one whose error leaves the rule's limit."""
-    return (yield from _replayed(features, batch, gamma, rule, True, w, random, draws, drawn))
+    return (
+        yield from _resumable_replay(features, batch, gamma, rule, True, w, random, draws, drawn)
+    )
 
 
-def _replayed(
+def _resumable_replay(
     features: Features,
     batch: TransitionBatch,
     gamma: float,
@@ -199,8 +201,10 @@ def _replayed(
     if not len(batch.x):
         raise LabError("an empty batch teaches nothing: collect some episodes first")
     learned, work = np.array(w, float), (len(w) + 2) * (features.active.shape[1] + 10)
-    for some in pieces(draws, work):
-        if not _replay(features, batch, gamma, rule, bootstrap, learned, random, some, drawn):
+    for some in split_work(draws, work):
+        if not _replay_updates(
+            features, batch, gamma, rule, bootstrap, learned, random, some, drawn
+        ):
             break
         drawn += some
         yield
@@ -208,7 +212,7 @@ def _replayed(
 
 
 @compiled
-def _replay(
+def _replay_updates(
     features: Features,
     batch: TransitionBatch,
     gamma: float,
@@ -221,7 +225,7 @@ def _replay(
 ) -> bool:
     """False where an error left the rule's limit."""
     for n in range(drawn + 1, drawn + draws + 1):
-        i = below(random, len(batch.x))
+        i = random_integer(random, len(batch.x))
         target = batch.returns[i]
         if bootstrap:
             least = np.inf

@@ -22,7 +22,7 @@ from labs.algorithms.monte_carlo import costs_to_go
 from labs.compiled import compiled
 from labs.errors import LabError
 from labs.problems.prediction import PredictionTask, empty_episode, sample_episode
-from labs.random_numbers import seeded
+from labs.random_numbers import random_states
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +49,11 @@ def empty_batch(states: int, seeds: int, rng: np.random.Generator) -> Batch:
         transitions=np.zeros((*shape, states)),
         costs=np.zeros(shape),
         returns=np.zeros(shape),
-        random=seeded(rng, seeds),
+        random=random_states(rng, seeds),
     )
 
 
-def collect(task: PredictionTask, batch: Batch, episodes: int) -> Batch:
+def collect_episodes(task: PredictionTask, batch: Batch, episodes: int) -> Batch:
     """So many further episodes. Raises LabError where one was cut: it has no cost-to-go."""
     sums = [batch.visits, batch.transitions, batch.costs, batch.returns, batch.random]
     visits, transitions, costs, returns, random = (array.copy() for array in sums)
@@ -62,7 +62,7 @@ def collect(task: PredictionTask, batch: Batch, episodes: int) -> Batch:
     return Batch(visits, transitions, costs, returns, random)
 
 
-def batch_of(
+def batch_from_episodes(
     episodes: Sequence[tuple[Sequence[int], Sequence[float]]], states: int, gamma: float
 ) -> Batch:
     """One learner's batch of given episodes: states x_0 ... x_T, the last one terminal, and costs

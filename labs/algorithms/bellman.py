@@ -23,7 +23,7 @@ from labs.rounding import round_up
 TIE_TOLERANCE = 1e-12
 """Relative to max|C| + max|V|: controls this close are equally good, and the present one is
 kept."""
-NO_BOUND = "with gamma = 1 that bounds no distance to the limit"
+NO_ERROR_BOUND = "with gamma = 1 that bounds no distance to the limit"
 """How the sentence ends of an iteration that stopped without knowing how near it is."""
 
 
@@ -63,10 +63,10 @@ def convergence_message(mdp: FiniteMDP, V: np.ndarray, change: float, tolerance:
     if change == 0.0:
         return "The last sweep changed no value."
     if mdp.gamma == 1.0:
-        return f"The last sweep changed no value by more than {float(tolerance)}; {NO_BOUND}."
+        return f"The last sweep changed no value by more than {float(tolerance)}; {NO_ERROR_BOUND}."
     # A backup adds up this many terms at most, each of them and each sum rounded.
     terms = mdp.U + (1 if mdp.deterministic else mdp.X)
-    size = _size(mdp, V) + change
+    size = _value_scale(mdp, V) + change
     far = error_bound(mdp.gamma, change, terms * np.finfo(float).eps * size)
     return f"No value changed by more than {float(tolerance)}: the limit is within {round_up(far)}."
 
@@ -96,9 +96,9 @@ def q_values(mdp: FiniteMDP, V: np.ndarray) -> np.ndarray:
         table: np.ndarray = mdp.C + mdp.gamma * V[mdp.successor]
         return table
     endless = ~np.isfinite(V)
-    Q: np.ndarray = mdp.C + mdp.gamma * mdp.expect(_finite(V))
+    Q: np.ndarray = mdp.C + mdp.gamma * mdp.expected_value(_finite(V))
     if endless.any():
-        Q[mdp.expect(endless.astype(float)) > 0.0] = np.inf
+        Q[mdp.expected_value(endless.astype(float)) > 0.0] = np.inf
     return Q
 
 
@@ -106,7 +106,7 @@ def _finite(V: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(V), V, 0.0)
 
 
-def _size(mdp: FiniteMDP, V: np.ndarray) -> float:
+def _value_scale(mdp: FiniteMDP, V: np.ndarray) -> float:
     return mdp.largest_cost + float(np.abs(_finite(V)).max())
 
 
@@ -118,13 +118,13 @@ def optimal_backup(
     if mdp.successor is not None:
         ahead, better = np.empty(mdp.X), np.empty(mdp.X, np.int64)
         old = policy if policy.ndim == 1 else np.full(mdp.X, -1)
-        tie = TIE_TOLERANCE * _size(mdp, V)
+        tie = TIE_TOLERANCE * _value_scale(mdp, V)
         change = _optimal_sweep(V, mdp.C, mdp.successor, mdp.gamma, old, tie, ahead, better)
         return ahead, better, change
     Q = q_values(mdp, V)
     ahead, better = Q.min(axis=1), Q.argmin(axis=1)
     if policy.ndim == 1:
-        kept = Q[np.arange(mdp.X), policy] <= ahead + TIE_TOLERANCE * _size(mdp, V)
+        kept = Q[np.arange(mdp.X), policy] <= ahead + TIE_TOLERANCE * _value_scale(mdp, V)
         better = np.where(kept, policy, better)
     return ahead, better, float(np.abs(ahead - V).max())
 

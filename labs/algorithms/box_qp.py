@@ -14,7 +14,7 @@ import numpy as np
 
 from labs.compiled import compiled
 
-SWITCHES = 10
+MAX_ACTIVE_SET_CHANGES = 10
 """Of the entries held, at most, for each entry."""
 ROUNDING = 1e-13
 """A gradient of less than this share of its terms counts as zero."""
@@ -33,7 +33,7 @@ def box_qp(
 ) -> bool:
     """Leaves the minimum in w (m,), in `held` (m,) what a bound holds, and in L (m, m) the factor
     of H + mu I over the others. False if that is not positive definite there or on the way, or
-    SWITCHES do not suffice."""
+    MAX_ACTIVE_SET_CHANGES do not suffice."""
     m = len(w)
     gradient, rounding, newton = np.empty(m), np.empty(m), np.empty(m)
     for i in range(m):
@@ -41,7 +41,7 @@ def box_qp(
     _gradient(H, mu, g, w, gradient, rounding)
     for i in range(m):
         held[i] = (w[i] <= low[i] and gradient[i] > 0.0) or (w[i] >= high[i] and gradient[i] < 0.0)
-    for _ in range(SWITCHES * (m + 1)):
+    for _ in range(MAX_ACTIVE_SET_CHANGES * (m + 1)):
         if not cholesky(H, mu, held, L):
             return False
         for i in range(m):

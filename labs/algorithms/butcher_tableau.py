@@ -13,12 +13,12 @@ from functools import cached_property
 import numpy as np
 
 from labs.errors import LabError
-from labs.number_texts import parse_number, plain_text
+from labs.number_texts import parse_number, strip_comments
 
-MOST_STAGES = 7
+MAX_STAGES = 7
 LARGEST_COEFFICIENT = 100.0
 """Of the numbers in a tableau that is typed in."""
-ROUNDING = 1e-8
+SUM_TOLERANCE = 1e-8
 """How far sums may be off: room for numbers typed with nine digits."""
 
 
@@ -64,8 +64,8 @@ def parse_tableau(text: str, pick: int = 0) -> Tableau:
         raise LabError(
             "a tableau has at least two rows: 'c | a ...' for each stage and '| b ...' at the end"
         )
-    if q > MOST_STAGES:
-        raise LabError(f"there are {q} rows of stages; at most {MOST_STAGES} are taken")
+    if q > MAX_STAGES:
+        raise LabError(f"there are {q} rows of stages; at most {MAX_STAGES} are taken")
     if weights > 2:
         raise LabError(f"there are {weights} rows of weights b at the end: one, or two of a pair")
     a, c = np.zeros((q, q)), np.zeros(q)
@@ -76,7 +76,7 @@ def parse_tableau(text: str, pick: int = 0) -> Tableau:
         c[i] = left[0]
         a[i, : len(row)] = row
         off = float(a[i].sum() - c[i])
-        if abs(off) > ROUNDING:
+        if abs(off) > SUM_TOLERANCE:
             raise LabError(
                 f"row {i + 1}: c = {c[i]:.10g} but its a add up to {a[i].sum():.10g}, {off:+.2g} "
                 "off; c_i is the sum of the a_ij"
@@ -91,14 +91,14 @@ def _weights(line: str, q: int, name: str) -> np.ndarray:
     if left:
         raise LabError(f"{name} ({line!r}) holds the weights b: nothing goes before its bar '|'")
     # Where they add up to 1, those left out are 0.
-    if len(given) != q and not (given and abs(sum(given) - 1.0) <= ROUNDING):
+    if len(given) != q and not (given and abs(sum(given) - 1.0) <= SUM_TOLERANCE):
         raise LabError(f"{name} has {len(given)} weights b; there are {q} stages")
     return np.array(given + [0.0] * (q - len(given)))
 
 
 def _lines(text: str) -> list[str]:
     """The rows, each with one bar, without what is only for the eye."""
-    text = plain_text(text).replace("│", "|")
+    text = strip_comments(text).replace("│", "|")
     text = re.sub(r"\\[dt]?frac\s*\{([^{}]*)\}\s*\{([^{}]*)\}", r"\1/\2", text)
     text = re.sub(r"\\(hline|begin\{[^}]*\}(\{[^}]*\})?|end\{[^}]*\})|\$", " ", text)
     text = re.sub(r"\\\\|;", "\n", _from_spreadsheet(text))

@@ -13,13 +13,13 @@ so a row of H x <= h holds with probability p at step k exactly where the nomina
 
 and a row of the control's limits likewise, with K Sigma_k K'. Two ways to use it:
 
-`from_measured_state` plans from z_0 = x at every period: Sigma_0 = 0, and margins grow along the
-horizon. What it promises is seen from the period that plans, and where x is too near a limit
-there is no plan: nothing rules that out.
+`nominal_from_measured_state` plans from z_0 = x at every period: Sigma_0 = 0, and margins grow
+along the horizon. What it promises is seen from the period that plans, and where x is too near a
+limit there is no plan: nothing rules that out.
 
-`from_predicted_state` plans from where the last plan's nominal state came to, whatever the noise
-did, and leaves the noise to K: the margins of all steps are those of the Sigma that Sigma_k grows
-to. Its promise is seen from the start, and with a terminal set that need not be left it is
+`nominal_from_predicted_state` plans from where the last plan's nominal state came to, whatever the
+noise did, and leaves the noise to K: the margins of all steps are those of the Sigma that Sigma_k
+grows to. Its promise is seen from the start, and with a terminal set that need not be left it is
 feasible for ever once it is.
 
 Either promises each row at each step, one by one: it is broken with probability at most 1 - p.
@@ -81,7 +81,7 @@ def back_off(limits: Polyhedron, Sigma: np.ndarray, probability: float) -> np.nd
     return np.asarray(ndtri(probability) * np.sqrt(np.maximum(variance, 0.0)))
 
 
-def from_measured_state(
+def nominal_from_measured_state(
     problem: LinearMpcProblem, noise: Noise, probability: float
 ) -> LinearMpcProblem:
     """The nominal problem to be solved from the measured state: margins along the horizon. Its
@@ -94,7 +94,7 @@ def from_measured_state(
     )
 
 
-def from_predicted_state(
+def nominal_from_predicted_state(
     problem: LinearMpcProblem, noise: Noise, probability: float
 ) -> LinearMpcProblem:
     """The nominal problem to be solved from the nominal state: X and U less the margins of the

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from labs.algorithms.collocation_grid import CollocationGrid
-from labs.algorithms.collocation_patterns import patterns
+from labs.algorithms.collocation_patterns import derivative_assemblies
 from labs.algorithms.collocation_schemes import SCHEMES
 from labs.algorithms.curvature import weighted_constraint_curvature, weighted_curvature
 from labs.errors import LabError
@@ -60,7 +60,9 @@ class Collocation:
         """Where x_0, the defects, x_T and e begin among the equalities; and how many there are."""
         self._x_final = x_final[self._ends]
         self.lower, self.upper = self._bounds()
-        self._c_y, self._g_y, self._l_yy = patterns(problem, self.grid, self._starts, self._ends)
+        self._c_y, self._g_y, self._l_yy = derivative_assemblies(
+            problem, self.grid, self._starts, self._ends
+        )
 
     # What the variables say ------------------------------------------------------------------
 
@@ -168,7 +170,7 @@ class Collocation:
             return f"the start of {x[k]}"
         if part == 1:
             step, _, component = (int(a[0]) for a in np.nonzero(self.grid.rows == k))
-            return f"the defect of {x[component]} in step {step + 1}{self._when(step)}"
+            return f"the defect of {x[component]} in step {step + 1}{self._time_text(step)}"
         if part == 2:
             return f"{x[self._ends[k]]} at the end"
         assert self.problem.end
@@ -178,7 +180,7 @@ class Collocation:
         """What g_i says."""
         assert self.problem.path
         node, k = divmod(i, self.problem.path.size)
-        return f"{self.problem.path.name(k)}{self._when(node)}"
+        return f"{self.problem.path.name(k)}{self._time_text(node)}"
 
     def variable_name(self, i: int) -> str:
         """What y_i is."""
@@ -186,9 +188,9 @@ class Collocation:
             return "the horizon T"
         names, grid = self.problem.x_names + self.problem.u_names, self.grid
         block, k = divmod(i, len(names))
-        return f"{names[k]}{self._when(grid.block_times[block] * self.N)}"
+        return f"{names[k]}{self._time_text(grid.block_times[block] * self.N)}"
 
-    def _when(self, step: float) -> str:
+    def _time_text(self, step: float) -> str:
         """At the start of a step."""
         if self.free_time:
             return f" at t = {step / self.N:.3g} T"

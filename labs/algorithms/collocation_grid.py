@@ -40,7 +40,7 @@ class CollocationGrid:
         else:
             halves = [(state_rows, self.states, 1.0)]
         shape = (self.points * b, self.n)
-        self.E = _sparse(shape, *halves, (control_rows, self.controls, 1.0))
+        self.E = _coefficient_matrix(shape, *halves, (control_rows, self.controls, 1.0))
         kinds = len(scheme.states)
         self.rows = np.arange(N * kinds * nx).reshape(N, kinds, nx)
         """(N, kinds, nx): which defect each row is; the last kind is s_(i+1) - s_i's."""
@@ -58,11 +58,13 @@ class CollocationGrid:
             for k, a in enumerate(coefficients)
             if a
         ]
-        self.D = _sparse((self.rows.size, self.n), *states)
-        self.W = _sparse((self.rows.size, self.points * nx), *rates)
+        self.D = _coefficient_matrix((self.rows.size, self.n), *states)
+        self.W = _coefficient_matrix((self.rows.size, self.points * nx), *rates)
 
 
-def _sparse(shape: tuple[int, int], *entries: tuple[np.ndarray, np.ndarray, float]) -> csr_array:
+def _coefficient_matrix(
+    shape: tuple[int, int], *entries: tuple[np.ndarray, np.ndarray, float]
+) -> csr_array:
     """With a coefficient at all pairs of rows and columns, arrays of the same shape."""
     rows = np.concatenate([row.ravel() for row, _, _ in entries])
     columns = np.concatenate([column.ravel() for _, column, _ in entries])

@@ -12,7 +12,7 @@ from labs.algorithms.collocation_grid import CollocationGrid
 from labs.problems.continuous_control import ContinuousProblem
 
 
-def patterns(
+def derivative_assemblies(
     problem: ContinuousProblem, grid: CollocationGrid, starts: np.ndarray, ends: np.ndarray
 ) -> tuple[Assembly, Assembly, Assembly]:
     """Of c_y, g_y and the Hessian. `starts`: where x_0, defects, the components `ends` of x_T, and
@@ -27,11 +27,11 @@ def patterns(
     b = nx + problem.dynamics.nu
     D, W, E = grid.D.tocoo(), grid.W.tocoo(), grid.E.tocoo()
     terms = [
-        _ones(starts[0] + np.arange(nx), first, np.ones(nx)),
-        _ones(starts[2] + np.arange(len(ends)), last[ends], np.ones(len(ends))),
-        _ones(starts[1] + D.row, D.col, D.data),
+        _constant_terms(starts[0] + np.arange(nx), first, np.ones(nx)),
+        _constant_terms(starts[2] + np.arange(len(ends)), last[ends], np.ones(len(ends))),
+        _constant_terms(starts[1] + D.row, D.col, D.data),
     ]
-    of_W, of_E = _pairs(W.col // nx, E.row // b, points)
+    of_W, of_E = _matching_pairs(W.col // nx, E.row // b, points)
     source = 1 + W.col[of_W] * b + E.row[of_E] % b
     terms.append(
         MatrixTerms(starts[1] + W.row[of_W], E.col[of_E], source, -W.data[of_W] * E.data[of_E])
@@ -52,7 +52,7 @@ def patterns(
     by_node = np.arange(len(grid.nodes) * each).reshape(len(grid.nodes), each)
     g_y = Assembly((by_node.size, n), by_node.size * nx, block_terms(by_node, grid.nodes, 0))
 
-    left, right = _pairs(E.row // b, E.row // b, points)
+    left, right = _matching_pairs(E.row // b, E.row // b, points)
     source = E.row[left] * b + E.row[right] % b
     terms = [
         MatrixTerms(E.col[left], E.col[right], source, E.data[left] * E.data[right]),
@@ -63,17 +63,19 @@ def patterns(
         by_T = np.full(E.nnz, n - 1)
         terms.append(MatrixTerms(E.col, by_T, sources + E.row, E.data))
         terms.append(MatrixTerms(by_T, E.col, sources + E.row, E.data))
-        terms.append(_ones(np.array([n - 1]), np.array([n - 1]), np.zeros(1)))
+        terms.append(_constant_terms(np.array([n - 1]), np.array([n - 1]), np.zeros(1)))
         sources += points * b
     return c_y, g_y, Assembly((n, n), sources, *terms)
 
 
-def _ones(rows: np.ndarray, columns: np.ndarray, coefficients: np.ndarray) -> MatrixTerms:
+def _constant_terms(rows: np.ndarray, columns: np.ndarray, coefficients: np.ndarray) -> MatrixTerms:
     """Constants: coefficients times the first source."""
     return MatrixTerms(rows, columns, np.zeros(len(rows), int), coefficients)
 
 
-def _pairs(left: np.ndarray, right: np.ndarray, keys: int) -> tuple[np.ndarray, np.ndarray]:
+def _matching_pairs(
+    left: np.ndarray, right: np.ndarray, keys: int
+) -> tuple[np.ndarray, np.ndarray]:
     """All i, j with left[i] = right[j], out of so many keys."""
     by_left = csr_array((np.ones(len(left)), (np.arange(len(left)), left)), shape=(len(left), keys))
     by_right = csr_array(

@@ -15,7 +15,7 @@ import numpy as np
 from labs.algorithms.sensitivities import Derivatives
 from labs.resumable import Resumable
 
-EPSILON = 1e-5
+DIFFERENCE_STEP = 1e-5
 """Of the differences, in parts of what is varied or of 1."""
 
 
@@ -37,9 +37,9 @@ def weighted_curvature(
         return np.asarray(sides[0] - sides[1])
 
     for j in range(n + m):
-        if j == n and not change(_all_controls(n, m)[None])[:, n:].any():
+        if j == n and not change(_generic_direction(n, m)[None])[:, n:].any():
             break
-        eps = EPSILON * np.maximum(1.0, np.abs(point[:, j]))
+        eps = DIFFERENCE_STEP * np.maximum(1.0, np.abs(point[:, j]))
         direction = np.zeros_like(point)
         direction[:, j] = eps
         found[:, :, j] = change(direction) / (2.0 * eps[:, None])
@@ -63,6 +63,6 @@ def weighted_constraint_curvature(
     return (yield from weighted_curvature(derivatives, X, no_control, weights))
 
 
-def _all_controls(n: int, m: int) -> np.ndarray:
+def _generic_direction(n: int, m: int) -> np.ndarray:
     """(n + m,) a direction along which only chance keeps f_u, were it not constant."""
-    return np.concatenate([np.zeros(n), EPSILON * (1.0 + np.sqrt(np.arange(1.0, m + 1.0)))])
+    return np.concatenate([np.zeros(n), DIFFERENCE_STEP * (1.0 + np.sqrt(np.arange(1.0, m + 1.0)))])

@@ -37,7 +37,7 @@ from labs.problems.optimal_control import (
 )
 from labs.resumable import Resumable, run_to_completion, timed
 
-HALVINGS = 12
+MAX_HALVINGS = 12
 """Of alpha, at most."""
 ROUNDING = 1e-14
 """Changes below this part of J cannot be told from rounding: Newton's step is then trusted."""
@@ -122,10 +122,10 @@ def init(problem: OptimalControlProblem, U: np.ndarray, options: DdpOptions) -> 
 
 def step(problem: OptimalControlProblem, options: DdpOptions, at: DdpIterate) -> DdpIterate:
     """One iteration: expansion, backward pass, line search. What has stopped stays as it is."""
-    return run_to_completion(step_in_pieces(problem, options, at))
+    return run_to_completion(resumable_step(problem, options, at))
 
 
-def step_in_pieces(
+def resumable_step(
     problem: OptimalControlProblem, options: DdpOptions, at: DdpIterate
 ) -> Resumable[DdpIterate]:
     """The same, pausing between pieces of some milliseconds."""
@@ -157,7 +157,7 @@ def step_in_pieces(
     elif at.mu == 0.0 and -at.expected <= options.tolerance * abs(at.cost):
         at = replace(at, converged=True, stopped=_convergence_message(at))
     else:
-        search = _search(problem, options, allowed, at, found.d_1, found.d_2)
+        search = _line_search(problem, options, allowed, at, found.d_1, found.d_2)
         at = yield from timed(search, seconds, "forward")
         if not at.stopped and at.iteration >= options.iterations:
             at = replace(at, stopped=_iteration_limit_message(at))
@@ -208,7 +208,7 @@ def _direction(
         where, d_1, d_2 = sweep(mu)
         if where < 0:
             break
-        mu = allowed.grown(mu)
+        mu = allowed.increase(mu)
         if mu > allowed.limit:
             why = (
                 f"Failed: Q_uu is not positive definite at step {where}, even with mu at its "
@@ -238,7 +238,7 @@ def _direction(
     return Direction(w, K, mu, d_1, d_2)
 
 
-def _search(
+def _line_search(
     problem: OptimalControlProblem,
     options: DdpOptions,
     allowed: Regularisation,
@@ -247,9 +247,9 @@ def _search(
     d_2: float,
 ) -> Resumable[DdpIterate]:
     """The line search, and mu for the next iteration."""
-    more = allowed.grown(at.mu)
+    more = allowed.increase(at.mu)
     diverged = 0
-    for k in range(HALVINGS + 1):
+    for k in range(MAX_HALVINGS + 1):
         alpha = 0.5**k
         expected = alpha * d_1 + 0.5 * alpha**2 * d_2
         X, U, cost = rollout(problem, at.X, at.U + alpha * at.w, at.K)
@@ -263,7 +263,7 @@ def _search(
                 X=X,
                 U=U,
                 cost=cost,
-                mu=allowed.shrunk(at.mu) if ratio >= options.c2 else more,
+                mu=allowed.decrease(at.mu) if ratio >= options.c2 else more,
                 alpha=alpha,
                 expected=expected,
                 actual=cost - at.cost,
@@ -274,8 +274,9 @@ def _search(
         return replace(at, mu=more, refused=at.refused or at.mu == 0.0)
     why = (
         "every rollout along it diverges"
-        if diverged > HALVINGS
-        else f"none of {HALVINGS + 1} step lengths lowers the cost enough (c_1 = {options.c1:g})"
+        if diverged > MAX_HALVINGS
+        else f"none of {MAX_HALVINGS + 1} step lengths lowers the cost enough "
+        f"(c_1 = {options.c1:g})"
     )
     return replace(
         at,

@@ -56,11 +56,11 @@ def backward_pass(
         for i in range(n):
             F[i, :n], F[i, n:] = A[t, i], B[t, i]
         # H = [Q_xx Q_xu; Q_ux Q_uu], slopes = [Q_x; Q_u].
-        _product(V_xx, F, VF)
+        _matrix_product(V_xx, F, VF)
         for j in range(n + m):
             for i in range(n):
                 lower[j, i] = F[i, j]
-        _product(lower, VF, H)
+        _matrix_product(lower, VF, H)
         slopes[:n], slopes[n:] = l_x[t], l_u[t]
         for j in range(n + m):
             for i in range(n):
@@ -99,12 +99,12 @@ def backward_pass(
             d_1 += w[t, i] * Q_u[i]
             d_2 += w[t, i] * curved
             slopes[n + i] = curved
-        _value(H, slopes, Q_u, w[t], gain, V_x, V_xx)
+        _value_update(H, slopes, Q_u, w[t], gain, V_x, V_xx)
     return -1, d_1, d_2
 
 
 @compiled
-def _product(left: np.ndarray, right: np.ndarray, out: np.ndarray) -> None:
+def _matrix_product(left: np.ndarray, right: np.ndarray, out: np.ndarray) -> None:
     """out = left right, row by row, so that the inner loop runs along memory."""
     for i in range(left.shape[0]):
         row = out[i]
@@ -117,7 +117,7 @@ def _product(left: np.ndarray, right: np.ndarray, out: np.ndarray) -> None:
 
 
 @compiled
-def _value(
+def _value_update(
     H: np.ndarray,
     curved: np.ndarray,
     Q_u: np.ndarray,

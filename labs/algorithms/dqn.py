@@ -17,22 +17,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labs.algorithms.network import Adam, adam_step, backward, forward, no_moments, random_weights
-from labs.algorithms.replay import Minibatch, Replay, empty, store
+from labs.algorithms.network import (
+    AdamState,
+    adam_step,
+    backpropagate,
+    forward,
+    random_weights,
+    zero_moments,
+)
+from labs.algorithms.replay import Minibatch, ReplayBuffer, empty_buffer, store
 from labs.compiled import compiled
 from labs.problems.environment import Environment
-from labs.random_numbers import below, seeded, uniform
+from labs.random_numbers import random_integer, random_states, uniform
 
 
 class DqnOptions(NamedTuple):
     """How it learns."""
 
     gamma: float = 0.99
-    rate: float = 1e-3
+    learning_rate: float = 1e-3
     """Of Adam."""
-    batch: int = 64
+    batch_size: int = 64
     """k"""
-    replays: bool = True
+    experience_replay: bool = True
     """False: it learns from the latest transitions only, as they come."""
     update_every: int = 4
     """Steps of a robot, all counted, from one mini-batch to the next."""
@@ -40,7 +47,7 @@ class DqnOptions(NamedTuple):
     """C; 1: there are no older weights."""
     polyak: float = 0.0
     """tau; 0: every C updates instead."""
-    double: bool = False
+    double_q_learning: bool = False
     epsilon: float = 1.0
     """At first,"""
     epsilon_end: float = 0.05
@@ -63,8 +70,8 @@ class DqnAgent:
     """(P,) float32"""
     target: np.ndarray
     """(P,) w-"""
-    adam: Adam
-    replay: Replay
+    adam: AdamState
+    replay: ReplayBuffer
     random: np.ndarray
     """(4,) uint64"""
     X: np.ndarray
@@ -89,7 +96,7 @@ class DqnAgent:
     """and |dL/dw|; all 0 before the first."""
 
     @property
-    def sound(self) -> bool:
+    def has_finite_weights(self) -> bool:
         """Whether all weights are finite."""
         return bool(np.isfinite(self.w).all())
 
@@ -106,15 +113,15 @@ def init(
     widths = (environment.observation_size, *hidden, environment.control_count)
     sizes = np.array(widths, np.int64)
     w = random_weights(sizes, rng)
-    random = seeded(rng, 1)[0]
+    random = random_states(rng, 1)[0]
     return DqnAgent(
         sizes=sizes,
         w=w,
         target=w,
-        adam=no_moments(len(w)),
-        replay=empty(capacity, environment.observation_size),
+        adam=zero_moments(len(w)),
+        replay=empty_buffer(capacity, environment.observation_size),
         random=random,
-        X=environment.starts(random, many),
+        X=environment.initial_states(random, many),
         ages=np.arange(many) * environment.horizon // many,
         paid=np.zeros(many),
         whole=np.arange(many) == 0,
@@ -125,13 +132,13 @@ def step(
     environment: Environment, options: DqnOptions, agent: DqnAgent, rounds: int = 1
 ) -> DqnAgent:
     """After so many further rounds, in each of which every robot makes a step."""
-    agent = _copied(agent)
+    agent = _copy_agent(agent)
     X, ages, paid, whole, random = agent.X, agent.ages, agent.paid, agent.whole, agent.random
     steps, updates, done = agent.steps, agent.updates, []
     many, stats = len(X), np.array([agent.loss, agent.td_error, agent.gradient_norm])
     seen = environment.observe(X)
     for _ in range(rounds):
-        U = choose(agent.sizes, agent.w, seen, epsilon(options, steps), random)
+        U = epsilon_greedy(agent.sizes, agent.w, seen, epsilon(options, steps), random)
         X, costs, ends = environment.step(X, U)
         after = environment.observe(X)
         scaled = (costs / options.cost_scale).astype(np.float32)
@@ -148,7 +155,7 @@ def step(
         if over.any():
             done += paid[over & whole].tolist()
             X, ages[over], paid[over], whole[over] = X.copy(), 0, 0.0, True
-            X[over] = environment.starts(random, int(over.sum()))
+            X[over] = environment.initial_states(random, int(over.sum()))
             after = environment.observe(X)
         seen = after
     loss, td_error, gradient_norm = map(float, stats)
@@ -172,7 +179,7 @@ def q_values(sizes: np.ndarray, w: np.ndarray, observations: np.ndarray) -> np.n
 
 
 @compiled
-def choose(
+def epsilon_greedy(
     sizes: np.ndarray, w: np.ndarray, observations: np.ndarray, share: float, random: np.ndarray
 ) -> np.ndarray:
     """Indices of controls (n,) int32: argmin_u Q, or with probability `share` any."""
@@ -180,7 +187,7 @@ def choose(
     chosen = np.empty(len(q), np.int32)
     for i in range(len(q)):
         blind = share > 0.0 and uniform(random) < share
-        chosen[i] = below(random, q.shape[1]) if blind else np.argmin(q[i])
+        chosen[i] = random_integer(random, q.shape[1]) if blind else np.argmin(q[i])
     return chosen
 
 
@@ -188,7 +195,7 @@ def greedy_cost(environment: Environment, agent: DqnAgent, X: np.ndarray) -> np.
     """(k,) what episodes from X (k, nx) cost under the greedy policy."""
     total, running = np.zeros(len(X)), np.ones(len(X), bool)
     for _ in range(environment.horizon):
-        U = choose(agent.sizes, agent.w, environment.observe(X), 0.0, agent.random)
+        U = epsilon_greedy(agent.sizes, agent.w, environment.observe(X), 0.0, agent.random)
         X, costs, ends = environment.step(X, U)
         total += costs * running
         running &= ~ends
@@ -201,8 +208,8 @@ def _learn(
     sizes: np.ndarray,
     w: np.ndarray,
     target: np.ndarray,
-    adam: Adam,
-    replay: Replay,
+    adam: AdamState,
+    replay: ReplayBuffer,
     random: np.ndarray,
     due: int,
     updates: int,
@@ -211,8 +218,8 @@ def _learn(
 ) -> None:
     """So many updates, in place."""
     capacity, o = replay.observations.shape
-    known, n = min(replay.stored[0], capacity), options.batch
-    if not options.replays:
+    known, n = min(replay.stored[0], capacity), options.batch_size
+    if not options.experience_replay:
         n = min(n, newest)
     x, after = np.empty((n, o), np.float32), np.empty((n, o), np.float32)
     u, y, ends = np.empty(n, np.int32), np.empty(n, np.float32), np.empty(n, np.bool_)
@@ -220,10 +227,14 @@ def _learn(
     dq, gradient = np.empty((n, sizes[-1]), np.float32), np.empty_like(w)
     for k in range(due):
         for i in range(n):
-            at = below(random, known) if options.replays else (replay.stored[0] - 1 - i) % capacity
+            at = (
+                random_integer(random, known)
+                if options.experience_replay
+                else (replay.stored[0] - 1 - i) % capacity
+            )
             x[i], after[i] = replay.observations[at], replay.next_observations[at]
             u[i], y[i], ends[i] = replay.controls[at], replay.costs[at], replay.ends[at]
-        if options.double:
+        if options.double_q_learning:
             q = forward(sizes, w, after, memory)
             best = np.empty(n, np.int32)
             for i in range(n):
@@ -242,8 +253,8 @@ def _learn(
             error = q[i, u[i]] - y[i]
             squares += error * error
             dq[i, u[i]] = error / n
-        backward(sizes, w, memory, dq, gradient)
-        adam_step(adam, w, gradient, options.rate)
+        backpropagate(sizes, w, memory, dq, gradient)
+        adam_step(adam, w, gradient, options.learning_rate)
         if options.polyak > 0.0:
             for i in range(len(w)):
                 target[i] += options.polyak * (w[i] - target[i])
@@ -256,14 +267,14 @@ def _learn(
     stats[2] = np.sqrt(total)
 
 
-def _copied(agent: DqnAgent) -> DqnAgent:
+def _copy_agent(agent: DqnAgent) -> DqnAgent:
     """With arrays of its own, to be written into."""
     return replace(
         agent,
         w=agent.w.copy(),
         target=agent.target.copy(),
-        adam=Adam(*(part.copy() for part in agent.adam)),
-        replay=Replay(*(part.copy() for part in agent.replay)),
+        adam=AdamState(*(part.copy() for part in agent.adam)),
+        replay=ReplayBuffer(*(part.copy() for part in agent.replay)),
         random=agent.random.copy(),
         ages=agent.ages.copy(),
         paid=agent.paid.copy(),

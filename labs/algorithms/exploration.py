@@ -24,9 +24,9 @@ from typing import NamedTuple
 import numpy as np
 
 from labs.compiled import compiled, inlined
-from labs.random_numbers import below, normal, uniform
+from labs.random_numbers import normal, random_integer, uniform
 
-EPSILON_GREEDY, BOLTZMANN, CONFIDENCE, FOLLOW, THOMPSON = range(5)
+EPSILON_GREEDY, BOLTZMANN, CONFIDENCE_BOUND, FIXED_POLICY, THOMPSON = range(5)
 
 
 class BehaviourPolicy(NamedTuple):
@@ -42,7 +42,7 @@ class BehaviourPolicy(NamedTuple):
     bound: float = 1.0
     """L [cost]: of confidence, the largest cost; of Thompson's, its standard deviation."""
     policy: np.ndarray = np.zeros(0, np.int64)
-    """(X,) int64: mu, for FOLLOW; empty otherwise."""
+    """(X,) int64: mu, for FIXED_POLICY; empty otherwise."""
 
 
 @inlined
@@ -51,9 +51,9 @@ def choose(
 ) -> int:
     """The control to try in state x, from Q and N, both (X, U)."""
     if behaviour.kind != EPSILON_GREEDY or behaviour.decay > 0.0:
-        return _choose_otherwise(behaviour, x, q, visits, random)
+        return _choose_general(behaviour, x, q, visits, random)
     if uniform(random) < behaviour.epsilon:
-        return below(random, q.shape[1])
+        return random_integer(random, q.shape[1])
     return greedy(q, x, random)
 
 
@@ -91,9 +91,11 @@ def boltzmann(q: np.ndarray, x: int, beta: float, random: np.ndarray) -> int:
 
 
 @compiled
-def confidence(q: np.ndarray, x: int, visits: np.ndarray, bound: float, random: np.ndarray) -> int:
+def lower_confidence_bound(
+    q: np.ndarray, x: int, visits: np.ndarray, bound: float, random: np.ndarray
+) -> int:
     """The control of the lowest confidence bound; an untried one comes before all others."""
-    width = bound * np.sqrt(2.0 * np.log(1.0 + _tries(visits, x)))
+    width = bound * np.sqrt(2.0 * np.log(1.0 + _visit_count(visits, x)))
     least, best, ties = np.inf, 0, 0
     for u in range(q.shape[1]):
         score = _lower_bound(q[x, u], visits[x, u], width)
@@ -127,7 +129,7 @@ def _lower_bound(cost: float, n: int, width: float) -> float:
 
 
 @inlined
-def _tries(visits: np.ndarray, x: int) -> int:
+def _visit_count(visits: np.ndarray, x: int) -> int:
     tries = 0
     for u in range(visits.shape[1]):
         tries += visits[x, u]
@@ -135,27 +137,27 @@ def _tries(visits: np.ndarray, x: int) -> int:
 
 
 @compiled
-def _choose_otherwise(
+def _choose_general(
     behaviour: BehaviourPolicy, x: int, q: np.ndarray, visits: np.ndarray, random: np.ndarray
 ) -> int:
     """Whatever is not epsilon-greedy with a constant epsilon."""
-    if behaviour.kind == CONFIDENCE:
-        return confidence(q, x, visits, behaviour.bound, random)
+    if behaviour.kind == CONFIDENCE_BOUND:
+        return lower_confidence_bound(q, x, visits, behaviour.bound, random)
     if behaviour.kind == THOMPSON:
         return thompson(q, x, visits, behaviour.bound, random)
-    n = 1.0 + _tries(visits, x) if behaviour.decay > 0.0 else 1.0
+    n = 1.0 + _visit_count(visits, x) if behaviour.decay > 0.0 else 1.0
     if behaviour.kind == BOLTZMANN:
         cooling = 1.0 + np.log(n) if behaviour.decay > 0.0 else 1.0
         return boltzmann(q, x, behaviour.beta * cooling, random)
     fading = 1.0 / n if behaviour.decay == 1.0 else n**-behaviour.decay
     if uniform(random) < behaviour.epsilon * fading:
-        return below(random, q.shape[1])
-    return int(behaviour.policy[x]) if behaviour.kind == FOLLOW else greedy(q, x, random)
+        return random_integer(random, q.shape[1])
+    return int(behaviour.policy[x]) if behaviour.kind == FIXED_POLICY else greedy(q, x, random)
 
 
 @compiled
 def _break_tie(q: np.ndarray, x: int, best: int, ties: int, random: np.ndarray) -> int:
-    skip = below(random, ties)
+    skip = random_integer(random, ties)
     for u in range(best, q.shape[1]):
         if q[x, u] == q[x, best]:
             if skip == 0:

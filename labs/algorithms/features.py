@@ -49,40 +49,40 @@ class Features(NamedTuple):
         return scipy.sparse.csr_array(entries, shape=(len(self.active), self.size))
 
 
-def from_matrix(phi: np.ndarray) -> Features:
+def features_from_matrix(phi: np.ndarray) -> Features:
     """Given values (X, d)."""
     states, size = phi.shape
     return Features(np.tile(np.arange(size), (states, 1)), np.ascontiguousarray(phi, float), size)
 
 
-def table(states: int) -> Features:
+def tabular_features(states: int) -> Features:
     """The linear form of a table."""
-    return aggregation(np.arange(states))
+    return state_aggregation(np.arange(states))
 
 
-def aggregation(groups: np.ndarray) -> Features:
+def state_aggregation(groups: np.ndarray) -> Features:
     """States of one group (X,) share one weight; groups are numbered from 0."""
     index = groups.astype(np.int64)[:, None]
     return Features(index, np.ones(index.shape), int(groups.max()) + 1)
 
 
-def vanishing(features: Features, where: np.ndarray) -> Features:
+def zero_features_at(features: Features, where: np.ndarray) -> Features:
     """The same, but 0 in the states of `where` (X,) bool: in terminal states values are 0."""
     return features._replace(value=np.where(where[:, None], 0.0, features.value))
 
 
-def polynomials(points: np.ndarray, order: int) -> Features:
+def polynomial_basis(points: np.ndarray, order: int) -> Features:
     """Of points (X, k)."""
     powers = _exponents(points, order)
-    return from_matrix(np.prod(points[:, None, :] ** powers, axis=2))
+    return features_from_matrix(np.prod(points[:, None, :] ** powers, axis=2))
 
 
-def fourier(points: np.ndarray, order: int) -> Features:
+def fourier_basis(points: np.ndarray, order: int) -> Features:
     """Of points (X, k)."""
-    return from_matrix(np.cos(np.pi * points @ _exponents(points, order).T))
+    return features_from_matrix(np.cos(np.pi * points @ _exponents(points, order).T))
 
 
-def radial(
+def radial_basis(
     points: np.ndarray, centers: np.ndarray, width: float, normalized: bool = False
 ) -> Features:
     """Of points (X, k) with centers (d, k); width > 0 in units of the cube."""
@@ -93,7 +93,7 @@ def radial(
     # Counted from the nearest center, so that far from all of them the sum is not 0.
     least = squares.min(axis=1, keepdims=True) if normalized else 0.0
     phi = np.exp(-(squares - least) / (2.0 * width**2))
-    return from_matrix(phi / phi.sum(axis=1, keepdims=True) if normalized else phi)
+    return features_from_matrix(phi / phi.sum(axis=1, keepdims=True) if normalized else phi)
 
 
 def grid_centers(count: int, dimensions: int) -> np.ndarray:
@@ -102,7 +102,7 @@ def grid_centers(count: int, dimensions: int) -> np.ndarray:
     return np.stack(np.meshgrid(*[line] * dimensions, indexing="ij"), -1).reshape(-1, dimensions)
 
 
-def tiles(points: np.ndarray, tilings: int, cells: np.ndarray) -> Features:
+def tile_coding(points: np.ndarray, tilings: int, cells: np.ndarray) -> Features:
     """Of points (X, k), in `tilings` grids of cells (k,) int along each side of the cube. Grid i is
     shifted by i / tilings of a cell times 1, 3, 5, ... along the sides (Miller and Glanz 1996), and
     has one more cell along each."""
@@ -121,7 +121,7 @@ def tiles(points: np.ndarray, tilings: int, cells: np.ndarray) -> Features:
     return Features(index, np.ones(index.shape), each * tilings)
 
 
-def values(features: Features, w: np.ndarray) -> np.ndarray:
+def state_values(features: Features, w: np.ndarray) -> np.ndarray:
     """(..., X) phi(x)' w of all states, of w (..., d)."""
     return np.asarray((features.value * w[..., features.active]).sum(axis=-1))
 

@@ -31,10 +31,10 @@ from labs.resumable import Resumable
 
 STENCIL = 4
 """Nodes a cubic takes along each axis."""
-SMOOTH = 1.0
+SMOOTHNESS_FACTOR = 1.0
 """Second differences of V up to so many (max V - min V) / nodes are no sign of a kink: a smooth V
 has some of that size, and at a kink they are larger by the number of nodes along an axis."""
-BETWEEN_PAUSES = 4096
+NODES_BETWEEN_PAUSES = 4096
 """Nodes."""
 
 
@@ -92,19 +92,24 @@ class ValueFunction:
 
     def value(self, x: np.ndarray, t: float) -> float:
         """V(x, t) at x (2,)."""
-        return float(self._look_up(x, t)[0])
+        return float(self._interpolate(x, t)[0])
 
     def gradient(self, x: np.ndarray, t: float, reach: float = 0.5) -> np.ndarray:
         """V_x(x, t) (2,) at x (2,), by central differences over so many cells each way."""
-        return np.asarray(np.array(self._look_up(x, t, reach)[1:]) / self.grid.spacing)
+        return np.asarray(np.array(self._interpolate(x, t, reach)[1:]) / self.grid.spacing)
 
-    def _look_up(self, x: np.ndarray, t: float, reach: float = 0.5) -> tuple[float, float, float]:
+    def _interpolate(
+        self, x: np.ndarray, t: float, reach: float = 0.5
+    ) -> tuple[float, float, float]:
         """V and its derivatives by cells; linear in time."""
         a, b = self.grid.cells(x)
         place = min(max(t / self.h, 0.0), len(self.V) - 1.0)
         k = min(int(place), len(self.V) - 2)
         part = place - k
-        before, after = (_expand(V, a, b, reach, smooth_bend(V)) for V in self.V[k : k + 2])
+        before, after = (
+            _interpolate_derivatives(V, a, b, reach, smoothness_threshold(V))
+            for V in self.V[k : k + 2]
+        )
         v, by_a, by_b = ((1.0 - part) * p + part * q for p, q in zip(before, after, strict=True))
         return v, by_a, by_b
 
@@ -155,7 +160,7 @@ def final_values(problem: ContinuousProblem, grid: StateGrid) -> np.ndarray:
     return np.array([problem.cost.final(x) for x in grid.nodes]).reshape(grid.shape)
 
 
-def controls(problem: ContinuousProblem, levels: int) -> np.ndarray:
+def control_levels(problem: ContinuousProblem, levels: int) -> np.ndarray:
     """So many levels of u, evenly within the limits. Raises LabError where there are none."""
     low, high = float(problem.u_lower[0]), float(problem.u_upper[0])
     if not np.isfinite(high - low) or levels < 3:
@@ -167,11 +172,11 @@ def controls(problem: ContinuousProblem, levels: int) -> np.ndarray:
 
 def step(ahead: np.ndarray, way: Characteristics, levels: np.ndarray) -> Resumable[np.ndarray]:
     """V (n, m) a step earlier than `ahead`. Pauses now and then."""
-    V, bend = np.empty_like(ahead), smooth_bend(ahead)
-    rows = max(1, BETWEEN_PAUSES // ahead.shape[1])
+    V, bend = np.empty_like(ahead), smoothness_threshold(ahead)
+    rows = max(1, NODES_BETWEEN_PAUSES // ahead.shape[1])
     for begin in range(0, len(V), rows):
         end = min(begin + rows, len(V))
-        _backward(ahead, bend, way.foot_0, way.foot_u, way.c, levels, V, begin, end)
+        _backward_rows(ahead, bend, way.foot_0, way.foot_u, way.c, levels, V, begin, end)
         yield
     return V
 
@@ -180,7 +185,7 @@ def solve(
     problem: ContinuousProblem, grid: StateGrid, steps: int, levels: int = 5
 ) -> Resumable[ValueFunction]:
     """V at all instants of so many steps. Pauses now and then."""
-    way, tried = characteristics(problem, grid, problem.T / steps), controls(problem, levels)
+    way, tried = characteristics(problem, grid, problem.T / steps), control_levels(problem, levels)
     V = np.empty((steps + 1, *grid.shape))
     V[steps] = final_values(problem, grid)
     for k in range(steps - 1, -1, -1):
@@ -188,13 +193,15 @@ def solve(
     return ValueFunction(problem.T, grid, V)
 
 
-def smooth_bend(V: np.ndarray) -> float:
+def smoothness_threshold(V: np.ndarray) -> float:
     """The square of the second difference of V (n, m) up to which it counts as smooth."""
-    return float((SMOOTH * np.ptp(V) / V.size) ** 2) + np.finfo(float).tiny ** 0.25
+    return float((SMOOTHNESS_FACTOR * np.ptp(V) / V.size) ** 2) + np.finfo(float).tiny ** 0.25
 
 
 @inlined
-def _cubic(p0: float, p1: float, p2: float, p3: float, s: float, smooth: float) -> float:
+def _interpolate_cubic(
+    p0: float, p1: float, p2: float, p3: float, s: float, smooth: float
+) -> float:
     """At s between 0 and 1 of values at -1, 0, 1, 2: a blend of the parabolas through the first and
     the last three, which is the cubic where both are smooth, and the flatter one at a kink."""
     left, right = p0 - 2.0 * p1 + p2, p1 - 2.0 * p2 + p3
@@ -205,7 +212,7 @@ def _cubic(p0: float, p1: float, p2: float, p3: float, s: float, smooth: float) 
 
 
 @inlined
-def _value(V: np.ndarray, a: float, b: float, smooth: float) -> float:
+def _interpolate_value(V: np.ndarray, a: float, b: float, smooth: float) -> float:
     """At a place in cells, or where it enters the grid: cubic, but linear along an axis in the
     outermost cells, where a cubic that leans on one side could grow without end."""
     n, m = V.shape
@@ -214,11 +221,17 @@ def _value(V: np.ndarray, a: float, b: float, smooth: float) -> float:
     i, j = int(a), int(b)
     if 1 <= i < n - 2 and 1 <= j < m - 2:
         s, r = a - i, b - j
-        return _cubic(
-            _cubic(V[i - 1, j - 1], V[i - 1, j], V[i - 1, j + 1], V[i - 1, j + 2], r, smooth),
-            _cubic(V[i, j - 1], V[i, j], V[i, j + 1], V[i, j + 2], r, smooth),
-            _cubic(V[i + 1, j - 1], V[i + 1, j], V[i + 1, j + 1], V[i + 1, j + 2], r, smooth),
-            _cubic(V[i + 2, j - 1], V[i + 2, j], V[i + 2, j + 1], V[i + 2, j + 2], r, smooth),
+        return _interpolate_cubic(
+            _interpolate_cubic(
+                V[i - 1, j - 1], V[i - 1, j], V[i - 1, j + 1], V[i - 1, j + 2], r, smooth
+            ),
+            _interpolate_cubic(V[i, j - 1], V[i, j], V[i, j + 1], V[i, j + 2], r, smooth),
+            _interpolate_cubic(
+                V[i + 1, j - 1], V[i + 1, j], V[i + 1, j + 1], V[i + 1, j + 2], r, smooth
+            ),
+            _interpolate_cubic(
+                V[i + 2, j - 1], V[i + 2, j], V[i + 2, j + 1], V[i + 2, j + 2], r, smooth
+            ),
             s,
             smooth,
         )
@@ -231,7 +244,7 @@ def _value(V: np.ndarray, a: float, b: float, smooth: float) -> float:
 
 
 @compiled
-def _expand(
+def _interpolate_derivatives(
     V: np.ndarray, a: float, b: float, d: float, smooth: float
 ) -> tuple[float, float, float]:
     """V (n, m) and its derivatives along both axes, by central differences over d, at a place."""
@@ -239,14 +252,16 @@ def _expand(
     a = min(max(a, d), n - 1.0 - d)
     b = min(max(b, d), m - 1.0 - d)
     return (
-        _value(V, a, b, smooth),
-        (_value(V, a + d, b, smooth) - _value(V, a - d, b, smooth)) / (2.0 * d),
-        (_value(V, a, b + d, smooth) - _value(V, a, b - d, smooth)) / (2.0 * d),
+        _interpolate_value(V, a, b, smooth),
+        (_interpolate_value(V, a + d, b, smooth) - _interpolate_value(V, a - d, b, smooth))
+        / (2.0 * d),
+        (_interpolate_value(V, a, b + d, smooth) - _interpolate_value(V, a, b - d, smooth))
+        / (2.0 * d),
     )
 
 
 @compiled
-def _backward(
+def _backward_rows(
     ahead: np.ndarray,
     smooth: float,
     foot_0: np.ndarray,
@@ -269,7 +284,7 @@ def _backward(
             best = 0
             for k in range(many):
                 u = levels[k]
-                later = _value(ahead, a + a_u * u, b + b_u * u, smooth)
+                later = _interpolate_value(ahead, a + a_u * u, b + b_u * u, smooth)
                 tried[k] = c_0 + u * (c_1 + u * c_2) + later
                 if tried[k] < tried[best]:
                     best = k
@@ -279,6 +294,6 @@ def _backward(
             if bend > 0.0:
                 off = 0.5 * (tried[middle - 1] - tried[middle + 1]) / bend
                 u = levels[middle] + gap * min(max(off, -1.0), 1.0)
-                later = _value(ahead, a + a_u * u, b + b_u * u, smooth)
+                later = _interpolate_value(ahead, a + a_u * u, b + b_u * u, smooth)
                 least = min(least, c_0 + u * (c_1 + u * c_2) + later)
             V[i, j] = least

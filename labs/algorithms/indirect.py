@@ -25,9 +25,9 @@ from labs.errors import LabError
 from labs.problems.continuous_control import ContinuousProblem
 from labs.resumable import Resumable
 
-ALLOWED = 1e-6
+STATE_LIMIT_TOLERANCE = 1e-6
 """By how much a limit on x may be exceeded."""
-MESHES = 25
+MAX_MESHES = 25
 """Collocation tries at most."""
 
 
@@ -53,7 +53,7 @@ class Extremal:
     """Why it ended, in a sentence; empty while it goes on."""
 
 
-def minimiser(problem: ContinuousProblem, X: np.ndarray, P: np.ndarray) -> np.ndarray:
+def hamiltonian_minimiser(problem: ContinuousProblem, X: np.ndarray, P: np.ndarray) -> np.ndarray:
     """U (k, nu) that minimises H at X, P (k, nx) within the limits. Raises LabError where l is not
     strictly convex in u, with a diagonal l_uu."""
     none = np.zeros((len(X), problem.dynamics.nu))
@@ -94,13 +94,13 @@ def solve(
     integrated with it. Pauses after every mesh. Raises LabError for a free T or e(x(T)) = 0."""
     check_problem(problem)
     nx = problem.dynamics.nx
-    cost = np.concatenate([[0.0], np.cumsum(np.diff(t) * _trapezoids(problem, X, P))])
+    cost = np.concatenate([[0.0], np.cumsum(np.diff(t) * _mean_cost_rates(problem, X, P))])
     z, meshes, stopped = np.vstack([X.T, P.T, cost]), 0, ""
     while not stopped:
         with np.errstate(all="ignore"):
             found = solve_bvp(
                 lambda _, z: canonical_equations(problem, z.T).T,
-                lambda start, end: _boundary(problem, start, end),
+                lambda start, end: _boundary_residual(problem, start, end),
                 t,
                 z,
                 tol=tolerance,
@@ -119,24 +119,24 @@ def solve(
             )
         elif found.success:
             stopped = f"Converged: on {len(t)} nodes the conditions are met to {residual:.1e}."
-        elif len(t) + added.sum() > nodes or meshes >= MESHES or not added.any():
+        elif len(t) + added.sum() > nodes or meshes >= MAX_MESHES or not added.any():
             stopped = (
                 f"Stopped short: on {len(t)} nodes the conditions are met to {residual:.1e} only. "
                 "Start from another guess, or shorten the horizon."
             )
         else:
-            t = _refined(t, added)
+            t = _refine_mesh(t, added)
             z = found.sol(t)
     z = np.where(np.isfinite(z), z, 0.0).T
     X, P = z[:, :nx], z[:, nx : 2 * nx]
     J = float(z[-1, -1] + problem.cost.final(X[-1]))
-    U = minimiser(problem, X, P)
+    U = hamiltonian_minimiser(problem, X, P)
     return check_limits(
         problem, Extremal(t, X, P, U, J, residual, meshes, bool(found.success), stopped)
     )
 
 
-def _refined(t: np.ndarray, added: np.ndarray) -> np.ndarray:
+def _refine_mesh(t: np.ndarray, added: np.ndarray) -> np.ndarray:
     """The mesh t with so many nodes (0, 1 or 2) more within each of its intervals."""
     gaps = np.diff(t)
     one, two = added == 1, added == 2
@@ -145,8 +145,8 @@ def _refined(t: np.ndarray, added: np.ndarray) -> np.ndarray:
     return np.sort(np.concatenate([t, middle, *thirds]))
 
 
-def _trapezoids(problem: ContinuousProblem, X: np.ndarray, P: np.ndarray) -> np.ndarray:
-    rate = problem.cost.running(X, minimiser(problem, X, P))
+def _mean_cost_rates(problem: ContinuousProblem, X: np.ndarray, P: np.ndarray) -> np.ndarray:
+    rate = problem.cost.running(X, hamiltonian_minimiser(problem, X, P))
     return np.asarray(0.5 * (rate[1:] + rate[:-1]))
 
 
@@ -154,14 +154,16 @@ def canonical_equations(problem: ContinuousProblem, z: np.ndarray) -> np.ndarray
     """(x', p', l) at points (x, p, cost so far), (k, 2 nx + 1)."""
     nx = problem.dynamics.nx
     X, P = z[:, :nx], z[:, nx : 2 * nx]
-    U = minimiser(problem, X, P)
+    U = hamiltonian_minimiser(problem, X, P)
     f, f_x, _ = problem.dynamics.derivatives(X, U)
     l_x = problem.cost.running_derivatives(X, U, exact=False).l_x
     change = -(l_x + np.einsum("kxy,kx->ky", f_x, P))
     return np.hstack([f, change, problem.cost.running(X, U)[:, None]])
 
 
-def _boundary(problem: ContinuousProblem, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+def _boundary_residual(
+    problem: ContinuousProblem, start: np.ndarray, end: np.ndarray
+) -> np.ndarray:
     """(2 nx + 1,), zero where all that is known at both ends holds."""
     nx = problem.dynamics.nx
     return np.concatenate(
@@ -193,7 +195,7 @@ def check_limits(problem: ContinuousProblem, found: Extremal) -> Extremal:
     over = np.maximum(found.X - problem.x_upper, problem.x_lower - found.X)
     if problem.path is not None:
         over = np.hstack([over, problem.path.values(found.X)])
-    if not found.converged or not over.max() > ALLOWED:
+    if not found.converged or not over.max() > STATE_LIMIT_TOLERANCE:
         return found
     i, j = np.unravel_index(int(np.argmax(over)), over.shape)
     nx = problem.dynamics.nx
@@ -206,11 +208,11 @@ def check_limits(problem: ContinuousProblem, found: Extremal) -> Extremal:
     return replace(found, converged=False, stopped=stopped)
 
 
-def at_times(found: Extremal, problem: ContinuousProblem, t: np.ndarray) -> Extremal:
+def resample_extremal(found: Extremal, problem: ContinuousProblem, t: np.ndarray) -> Extremal:
     """The same extremal at other times t (k,) within [0, T], by cubics that meet x', p'."""
     nx = problem.dynamics.nx
     z = np.hstack([found.X, found.P, np.zeros((len(found.t), 1))])
     slopes = canonical_equations(problem, z)[:, : 2 * nx]
     z = CubicHermiteSpline(found.t, z[:, : 2 * nx], slopes)(t)
     X, P = z[:, :nx], z[:, nx:]
-    return replace(found, t=t, X=X, P=P, U=minimiser(problem, X, P))
+    return replace(found, t=t, X=X, P=P, U=hamiltonian_minimiser(problem, X, P))

@@ -11,15 +11,15 @@ from labs.algorithms.indirect import (
     canonical_equations,
     check_limits,
     check_problem,
-    minimiser,
+    hamiltonian_minimiser,
     terminal_residual,
 )
 from labs.problems.continuous_control import ContinuousProblem
 from labs.resumable import Resumable
 
-DIVERGED = 1e8
+DIVERGENCE_LIMIT = 1e8
 """A motion or a costate larger than this has diverged."""
-PARTS = 0.5 ** np.arange(9.0)
+STEP_FRACTIONS = 0.5 ** np.arange(9.0)
 """Of a Newton step, that are tried."""
 
 
@@ -69,7 +69,7 @@ def shoot(
     X, P = z[:, :nx], z[:, nx : 2 * nx]
     J = float(z[-1, -1] + problem.cost.final(X[-1]))
     left = float(np.abs(miss).max())
-    t, U = np.linspace(0.0, problem.T, steps + 1), minimiser(problem, X, P)
+    t, U = np.linspace(0.0, problem.T, steps + 1), hamiltonian_minimiser(problem, X, P)
     return check_limits(problem, Extremal(t, X, P, U, J, left, k, converged, stopped))
 
 
@@ -84,8 +84,8 @@ def _newton_step(
     if not np.isfinite(jacobian).all() or np.linalg.matrix_rank(jacobian) < len(p0):
         return None
     step = np.linalg.solve(jacobian, -miss)
-    tried = yield from _integrate(problem, p0 + PARTS[:, None] * step, steps)
-    for i, part in enumerate(PARTS):
+    tried = yield from _integrate(problem, p0 + STEP_FRACTIONS[:, None] * step, steps)
+    for i, part in enumerate(STEP_FRACTIONS):
         after = terminal_residual(problem, tried[-1, i])
         if np.linalg.norm(after) < (1.0 - 1e-4 * part) * np.linalg.norm(miss):
             return p0 + part * step, tried[:, i], after
@@ -107,7 +107,7 @@ def _integrate(problem: ContinuousProblem, P0: np.ndarray, steps: int) -> Resuma
             k3 = canonical_equations(problem, z + 0.5 * h * k2)
             k4 = canonical_equations(problem, z + h * k3)
             z = z + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
-            z[~(np.abs(z).max(axis=1) < DIVERGED)] = np.nan
+            z[~(np.abs(z).max(axis=1) < DIVERGENCE_LIMIT)] = np.nan
         path[i + 1] = z
         if i % 20 == 0:
             yield

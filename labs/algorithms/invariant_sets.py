@@ -18,18 +18,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from labs.algorithms.polygons import (
-    Unbounded,
-    from_vertices,
+    UnboundedError,
     minkowski_sum,
+    normalize_rows,
+    polyhedron_from_vertices,
     vertices,
-    with_unit_rows,
 )
 from labs.algorithms.polytopes import is_empty, project, support
 from labs.problems.linear_mpc import LinearMpcProblem, check_holds
 from labs.problems.polyhedron import Polyhedron
 
 TOLERANCE = 1e-9
-MOST = 500
+MAX_ITERATIONS = 500
 
 
 def backward_reachable(
@@ -45,8 +45,10 @@ def backward_reachable(
     drift = np.zeros(len(A)) if c is None else c
     if len(A) == 2 and B.shape[1] <= 2:
         try:
-            return _by_sums(A, B, state_set, control_set, vertices(target), drift)
-        except Unbounded:
+            return _backward_reachable_by_minkowski_sum(
+                A, B, state_set, control_set, vertices(target), drift
+            )
+        except UnboundedError:
             pass
     n, m = B.shape
     both = target.preimage(np.hstack([A, B]))
@@ -56,7 +58,7 @@ def backward_reachable(
     return project(both.intersection(in_X).intersection(in_U), n)
 
 
-def _by_sums(
+def _backward_reachable_by_minkowski_sum(
     A: np.ndarray,
     B: np.ndarray,
     state_set: Polyhedron,
@@ -64,12 +66,12 @@ def _by_sums(
     target: np.ndarray,
     c: np.ndarray,
 ) -> Polyhedron:
-    controls = _interval(control_set) if B.shape[1] == 1 else vertices(control_set)
-    before = from_vertices(minkowski_sum(target, -controls @ B.T - c))
-    return from_vertices(vertices(before.preimage(A).intersection(state_set)))
+    controls = _control_interval(control_set) if B.shape[1] == 1 else vertices(control_set)
+    before = polyhedron_from_vertices(minkowski_sum(target, -controls @ B.T - c))
+    return polyhedron_from_vertices(vertices(before.preimage(A).intersection(state_set)))
 
 
-def _interval(control_set: Polyhedron) -> np.ndarray:
+def _control_interval(control_set: Polyhedron) -> np.ndarray:
     """The ends (2, 1) of a set of the line; none (0, 1) where it is empty."""
     H, h = control_set.H[:, 0], control_set.h
     high = (h[H > 0.0] / H[H > 0.0]).min(initial=np.inf)
@@ -77,7 +79,7 @@ def _interval(control_set: Polyhedron) -> np.ndarray:
     if low > high or (h[H == 0.0] < 0.0).any():
         return np.zeros((0, 1))
     if np.isinf([low, high]).any():
-        raise Unbounded("the set reaches to infinity: add the limits that bound it")
+        raise UnboundedError("the set reaches to infinity: add the limits that bound it")
     return np.array([[low], [high]])
 
 
@@ -99,8 +101,8 @@ def feasible_sets(
         both = sets[0].preimage(x_of)
         for _ in range(hold):
             k -= 1
-            X = _tightened(problem.state_set, problem.state_margins, k)
-            U = _tightened(problem.control_set, problem.control_margins, k)
+            X = _tighten_set(problem.state_set, problem.state_margins, k)
+            U = _tighten_set(problem.control_set, problem.control_margins, k)
             if hold == 1:
                 before = backward_reachable(problem.A, problem.B, X, U, sets[0], problem.c)
             else:
@@ -111,20 +113,20 @@ def feasible_sets(
     return sets
 
 
-def _tightened(given: Polyhedron, margins: np.ndarray | None, k: int) -> Polyhedron:
+def _tighten_set(given: Polyhedron, margins: np.ndarray | None, k: int) -> Polyhedron:
     return given if margins is None else Polyhedron(given.H, given.h - margins[k])
 
 
-def excess(inner: Polyhedron, outer: Polyhedron) -> float:
+def inclusion_violation(inner: Polyhedron, outer: Polyhedron) -> float:
     """How far `inner` reaches out of `outer`: the largest distance by which it exceeds a row; below
     zero where it stays away from all of them, -inf where it is empty."""
-    unit = with_unit_rows(outer)
+    unit = normalize_rows(outer)
     return float((support(inner, unit.H) - unit.h).max(initial=-np.inf))
 
 
 def positive_invariance_violation(A: np.ndarray, given: Polyhedron) -> float:
     """How far one step x+ = A x leads out of the set; at most 0 if it is positively invariant."""
-    unit = with_unit_rows(given)
+    unit = normalize_rows(given)
     return float((support(given, unit.H @ A) - unit.h).max(initial=-np.inf))
 
 
@@ -137,7 +139,7 @@ def control_invariance_violation(
 ) -> float:
     """How far the set reaches out of Pre(set); at most 0 if it is control invariant."""
     anywhere = Polyhedron(np.zeros((0, len(A))), np.zeros(0))
-    return excess(given, backward_reachable(A, B, anywhere, control_set, given, c))
+    return inclusion_violation(given, backward_reachable(A, B, anywhere, control_set, given, c))
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,14 +171,14 @@ def step(
 ) -> InvariantSet:
     """S becomes Pre(S) within S: what can stay in S for a step longer."""
     left = backward_reachable(A, B, at.set, control_set, at.set, c)
-    residual = excess(at.set, left)
+    residual = inclusion_violation(at.set, left)
     if is_empty(left):
         done = f"nothing is left after {at.count + 1} steps: from no state can it stay in X"
         return InvariantSet(at.count + 1, left, residual, False, done)
     if residual <= TOLERANCE:
         return InvariantSet(at.count, at.set, residual, True, f"invariant after {at.count} steps")
-    if at.count >= MOST:
-        done = f"stopped after {MOST} steps, the last of which took {residual:.2g} away"
+    if at.count >= MAX_ITERATIONS:
+        done = f"stopped after {MAX_ITERATIONS} steps, the last of which took {residual:.2g} away"
         return InvariantSet(at.count, at.set, residual, False, done)
     return InvariantSet(at.count + 1, left, residual)
 

@@ -21,7 +21,7 @@ from scipy.optimize import least_squares
 
 from labs.algorithms.jacobian import ForwardKinematics, geometric_jacobian
 
-REACHED = 1e-3
+REACH_TOLERANCE = 1e-3
 """[m] A place is within reach if the frame comes as near as this."""
 POSTURE_STEPS, POSTURE_DAMPING = 60, 0.05
 """Of the search for the posture nearest to a place: steps, and the least damping [m/rad]."""
@@ -105,7 +105,8 @@ def nearest_distance(
 ) -> float:
     """The least |p_e(q) - p*| [m] to a place p* (3,) over lower <= q <= upper (n,), by
     Gauss-Newton steps in a trust region (scipy.optimize.least_squares) from each start (n,) until
-    one is within REACHED. Such minima are local: what is found is at least the least distance."""
+    one is within REACH_TOLERANCE. Such minima are local: what is found is at least the least
+    distance."""
     least = np.inf
     for start in starts:
         found = least_squares(
@@ -117,7 +118,7 @@ def nearest_distance(
             xtol=1e-6,
         )
         least = min(least, float(np.linalg.norm(found.fun)))
-        if least <= REACHED:
+        if least <= REACH_TOLERANCE:
             break
     return least
 

@@ -50,7 +50,7 @@ def pid(model: pin.Model, data: pin.Data, gains: Gains) -> ControlLaw:
     return lambda q, v, z, q_ref, v_ref, a_ref: kp * (q_ref - q) + kd * (v_ref - v) + ki * z
 
 
-def pd_gravity(model: pin.Model, data: pin.Data, gains: Gains) -> ControlLaw:
+def pd_gravity_compensation(model: pin.Model, data: pin.Data, gains: Gains) -> ControlLaw:
     """tau = k_p e + k_d e' + g(q): of the model, its gravity only."""
     kp, _, kd = _gain_vectors(model, gains)
     gravity = pin.computeGeneralizedGravity
@@ -71,7 +71,7 @@ def computed_torque(model: pin.Model, data: pin.Data, gains: Gains) -> ControlLa
 CONTROL_LAWS: Mapping[str, Callable[[pin.Model, pin.Data, Gains], ControlLaw]] = {
     "open-loop": open_loop,
     "pid": pid,
-    "pd-gravity": pd_gravity,
+    "pd-gravity": pd_gravity_compensation,
     "computed-torque": computed_torque,
 }
 

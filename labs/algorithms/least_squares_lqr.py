@@ -15,11 +15,11 @@ from scipy.linalg import solve_triangular
 from labs.errors import LabError
 from labs.problems.linear_quadratic import LqrProblem, weight_roots
 
-LARGEST = 40_000_000
+MAX_MATRIX_ENTRIES = 40_000_000
 """Entries of a matrix worth building: 320 MB."""
 
 
-def trajectory_map(problem: LqrProblem) -> tuple[np.ndarray, np.ndarray]:
+def prediction_matrices(problem: LqrProblem) -> tuple[np.ndarray, np.ndarray]:
     """H (N n, n) and G (N n, N m) of X = H x_0 + G U."""
     n, m, steps = problem.n, problem.m, problem.horizon
     a, b = problem.terms["a"], problem.terms["b"]
@@ -33,7 +33,7 @@ def trajectory_map(problem: LqrProblem) -> tuple[np.ndarray, np.ndarray]:
     return h.reshape(steps * n, n), g.reshape(steps * n, steps * m)
 
 
-def solve_at_once(problem: LqrProblem, x0: np.ndarray) -> np.ndarray:
+def solve_least_squares(problem: LqrProblem, x0: np.ndarray) -> np.ndarray:
     """The optimal controls (N, m) from x0 (n,). Raises LabError for a problem with terms beside
     A, B, Q, R and Q_f, and for one too large to write down."""
     n, m, steps = problem.n, problem.m, problem.horizon
@@ -41,12 +41,12 @@ def solve_at_once(problem: LqrProblem, x0: np.ndarray) -> np.ndarray:
         raise LabError(
             "the least-squares problem takes A, B, Q, R and Q_f alone; solve this by Riccati"
         )
-    if steps * (n + m) * steps * m > LARGEST:
+    if steps * (n + m) * steps * m > MAX_MATRIX_ENTRIES:
         raise LabError(
             f"N = {steps} makes a matrix of {steps * (n + m)} by {steps * m} entries, more than "
-            f"{LARGEST}: shorten the horizon, or solve this by Riccati"
+            f"{MAX_MATRIX_ENTRIES}: shorten the horizon, or solve this by Riccati"
         )
-    h, g = trajectory_map(problem)
+    h, g = prediction_matrices(problem)
     by_x = np.broadcast_to(weight_roots(problem.terms["q"]), (steps, n, n)).copy()
     by_x[:-1], by_x[-1] = by_x[1:], weight_roots(problem.terms["q_final"])[0]
     by_u = np.broadcast_to(weight_roots(problem.terms["r"]), (steps, m, m))

@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labs.algorithms.exploration import FOLLOW, BehaviourPolicy, choose
-from labs.algorithms.features import Features, add_features, evaluate, values
+from labs.algorithms.exploration import FIXED_POLICY, BehaviourPolicy, choose
+from labs.algorithms.features import Features, add_features, evaluate, state_values
 from labs.algorithms.monte_carlo import costs_to_go
 from labs.compiled import compiled
 from labs.errors import LabError
@@ -28,12 +28,12 @@ from labs.problems.episodes import (
     UpdateRule,
     initial_state,
     min_q,
-    record,
+    record_step,
     step_size,
     transition,
 )
 from labs.problems.prediction import empty_episode
-from labs.random_numbers import seeded
+from labs.random_numbers import random_states
 
 MC_CONTROL, SARSA, Q_LEARNING = range(3)
 
@@ -52,7 +52,7 @@ class LinearControllers:
     """(S, k) discounted cost of each episode of the last step."""
     lengths: np.ndarray
     """(S, k) int64: its number of transitions."""
-    sound: np.ndarray
+    bounded: np.ndarray
     """(S,) bool: False once an update has left the rule's limit; the learner then stands still."""
 
 
@@ -68,10 +68,10 @@ def init(
     return LinearControllers(
         w=np.zeros((seeds, controls, features.size)),
         visits=np.zeros((seeds, states, controls), np.int32),
-        random=seeded(rng, seeds),
+        random=random_states(rng, seeds),
         costs=np.zeros((seeds, 0)),
         lengths=np.zeros((seeds, 0), np.int64),
-        sound=np.ones(seeds, bool),
+        bounded=np.ones(seeds, bool),
     )
 
 
@@ -88,23 +88,23 @@ def step(
     states, controls = task.cost.shape
     if learners.w.shape[1:] != (controls, features.size):
         raise LabError(f"weights {learners.w.shape[1:]}, not {(controls, features.size)}")
-    if len(behaviour.policy) != (states if behaviour.kind == FOLLOW else 0):
+    if len(behaviour.policy) != (states if behaviour.kind == FIXED_POLICY else 0):
         raise LabError(f"a policy of {len(behaviour.policy)} controls for {states} states")
     if method not in range(3):
         raise LabError(f"there is no method {method}: they are numbered from 0 to 2")
     w, visits, random = learners.w.copy(), learners.visits.copy(), learners.random.copy()
     costs = np.zeros((len(w), episodes))
     lengths = np.zeros((len(w), episodes), np.int64)
-    sound = learners.sound.copy()
+    sound = learners.bounded.copy()
     _learn(task, features, behaviour, rule, method, w, visits, random, costs, lengths, sound)
     return replace(
-        learners, w=w, visits=visits, random=random, costs=costs, lengths=lengths, sound=sound
+        learners, w=w, visits=visits, random=random, costs=costs, lengths=lengths, bounded=sound
     )
 
 
 def q_table(features: Features, w: np.ndarray) -> np.ndarray:
     """(X, U) q of weights (U, d)."""
-    return values(features, w).T
+    return state_values(features, w).T
 
 
 @compiled
@@ -146,15 +146,15 @@ def _q_learning(
     for k in range(len(learner.costs)):
         x, discount = initial_state(task, learner.random), 1.0
         while learner.lengths[k] < task.horizon and not task.terminal[x]:
-            _look(features, w, learner.q, x)
+            _write_q_row(features, w, learner.q, x)
             u = choose(behaviour, x, learner.q, learner.visits, learner.random)
             y = transition(task, x, u, learner.random)
-            _look(features, w, learner.q, y)
+            _write_q_row(features, w, learner.q, y)
             target = task.cost[x, u]
             if not task.terminal[y]:
                 target += task.gamma * min_q(learner.q, y)
-            discount = record(task, learner, k, x, u, discount)
-            if not _move(features, rule, learner, w, x, u, target):
+            discount = record_step(task, learner, k, x, u, discount)
+            if not _update_weights(features, rule, learner, w, x, u, target):
                 return False
             x = y
     return True
@@ -172,17 +172,17 @@ def _sarsa(
     """False where it diverged."""
     for k in range(len(learner.costs)):
         x, discount = initial_state(task, learner.random), 1.0
-        _look(features, w, learner.q, x)
+        _write_q_row(features, w, learner.q, x)
         u = choose(behaviour, x, learner.q, learner.visits, learner.random)
         while learner.lengths[k] < task.horizon and not task.terminal[x]:
             y, next_u = transition(task, x, u, learner.random), 0
             target = task.cost[x, u]
             if not task.terminal[y]:
-                _look(features, w, learner.q, y)
+                _write_q_row(features, w, learner.q, y)
                 next_u = choose(behaviour, y, learner.q, learner.visits, learner.random)
                 target += task.gamma * learner.q[y, next_u]
-            discount = record(task, learner, k, x, u, discount)
-            if not _move(features, rule, learner, w, x, u, target):
+            discount = record_step(task, learner, k, x, u, discount)
+            if not _update_weights(features, rule, learner, w, x, u, target):
                 return False
             x, u = y, next_u
     return True
@@ -203,28 +203,30 @@ def _monte_carlo(
     for k in range(len(learner.costs)):
         x, discount, T = initial_state(task, learner.random), 1.0, 0
         while learner.lengths[k] < task.horizon and not task.terminal[x]:
-            _look(features, w, learner.q, x)
+            _write_q_row(features, w, learner.q, x)
             u = choose(behaviour, x, learner.q, learner.visits, learner.random)
             states[T], controls[T], episode.costs[T], T = x, u, task.cost[x, u], T + 1
-            discount = record(task, learner, k, x, u, discount)
+            discount = record_step(task, learner, k, x, u, discount)
             x = transition(task, x, u, learner.random)
         # What a cut episode would still have cost nobody knows: it counts as far as it went.
         costs_to_go(task.gamma, episode, T, 0.0)
         for t in range(T):
-            if not _move(features, rule, learner, w, states[t], controls[t], episode.returns[t]):
+            if not _update_weights(
+                features, rule, learner, w, states[t], controls[t], episode.returns[t]
+            ):
                 return False
     return True
 
 
 @compiled
-def _look(features: Features, w: np.ndarray, q: np.ndarray, x: int) -> None:
+def _write_q_row(features: Features, w: np.ndarray, q: np.ndarray, x: int) -> None:
     """Writes q(x, .) where behaviour policies look."""
     for u in range(len(w)):
         q[x, u] = evaluate(features, w[u], x)
 
 
 @compiled
-def _move(
+def _update_weights(
     features: Features,
     rule: UpdateRule,
     learner: Learner,

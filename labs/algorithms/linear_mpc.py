@@ -19,20 +19,20 @@ import numpy as np
 
 from labs.algorithms import linear_mpc_condensed as condensed
 from labs.algorithms import linear_mpc_sparse as sparse
-from labs.algorithms.linear_mpc_condensed import INFEASIBLE, SOLVED, Condensed
+from labs.algorithms.linear_mpc_condensed import INFEASIBLE, SOLVED, CondensedQp
 from labs.algorithms.linear_mpc_infeasible import Infeasibility, first_infeasibility
-from labs.algorithms.linear_mpc_limits import KINDS, ProblemTerms, TwoSided, sets
-from labs.algorithms.linear_mpc_sparse import Sparse
+from labs.algorithms.linear_mpc_limits import LIMIT_KINDS, ProblemTerms, TwoSidedLimits, limit_sets
+from labs.algorithms.linear_mpc_sparse import SparseQp
 from labs.errors import LabError
 from labs.problems.linear_mpc import LinearMpcProblem
 from labs.problems.receding_horizon import Plan
 from labs.resumable import Resumable
 
-Form = Literal["condensed", "sparse"]
-TERMS = ("c", "x_ref", "u_ref", "q", "r", "state_margins", "control_margins")
-MET = 1e-6
+QpForm = Literal["condensed", "sparse"]
+CHANGEABLE_TERMS = ("c", "x_ref", "u_ref", "q", "r", "state_margins", "control_margins")
+LIMIT_TOLERANCE = 1e-6
 """By how much of 1 + |h| what a solver calls solved may exceed a limit."""
-PIECE = 0.004
+SECONDS_BETWEEN_PAUSES = 0.004
 """[s] of work between two pauses of a batch."""
 
 
@@ -62,7 +62,7 @@ class LinearPlanner:
     def __init__(
         self,
         problem: LinearMpcProblem,
-        form: Form = "condensed",
+        form: QpForm = "condensed",
         penalty: float | None = None,
         holds: Sequence[int] | None = None,
     ) -> None:
@@ -74,16 +74,16 @@ class LinearPlanner:
         if holds is not None and (form == "sparse" or penalty is not None):
             raise LabError("controls are held over several steps in condensed form, limits hard")
         self.problem, self.form, self.penalty, self.holds = problem, form, penalty, holds
-        self._condensed: dict[int, Condensed] = {}
-        self._sparse: dict[tuple[int, bool], Sparse] = {}
+        self._condensed: dict[int, CondensedQp] = {}
+        self._sparse: dict[tuple[int, bool], SparseQp] = {}
         self._condensed_data: dict[int, tuple[ProblemTerms, condensed.CondensedData]] = {}
         self._sparse_data: dict[tuple[int, bool], sparse.SparseData] = {}
 
-    def following(self, **terms: np.ndarray | None) -> Self:
+    def with_terms(self, **terms: np.ndarray | None) -> Self:
         """The same with other terms of the problem: of c, x_ref, u_ref, q, r and the margins,
         which leave what is factorised as it is. Raises LabError for another name."""
-        if wrong := sorted(set(terms) - set(TERMS)):
-            raise LabError(f"{', '.join(wrong)} may not change; {', '.join(TERMS)} may")
+        if wrong := sorted(set(terms) - set(CHANGEABLE_TERMS)):
+            raise LabError(f"{', '.join(wrong)} may not change; {', '.join(CHANGEABLE_TERMS)} may")
         other = type(self)(
             replace(self.problem, **terms),  # type: ignore[arg-type]
             self.form,
@@ -101,12 +101,12 @@ class LinearPlanner:
         begun = perf_counter()
         N = self.problem.N if N is None else N
         if self.form == "condensed":
-            plan = yield from self._condensedly(x, guess, N)
+            plan = yield from self._plan_condensed(x, guess, N)
         else:
-            plan = self._sparsely(x, N, hard=True)
+            plan = self._plan_sparse(x, N, hard=True)
         if self.penalty is not None and not (plan.found and self._is_exact(plan)):
             yield
-            plan = self._soften(x, N, plan)
+            plan = self._plan_softened(x, N, plan)
         if not plan.found:
             yield
             form, _, data = yield from self._condense(N)
@@ -127,16 +127,16 @@ class LinearPlanner:
             if flag == SOLVED:
                 V[i], u[i], active = value, form.controls(W)[0], np.sign(rows)
             elif not (flag == INFEASIBLE and form.trusted) and self.holds is None:
-                plan = self._sparsely(x, self.problem.N, hard=True)
+                plan = self._plan_sparse(x, self.problem.N, hard=True)
                 V[i], u[i] = plan.cost, plan.U[0] if plan.found else np.nan
-            if perf_counter() - begun > PIECE:
+            if perf_counter() - begun > SECONDS_BETWEEN_PAUSES:
                 yield
                 begun = perf_counter()
         return OptimalValues(V, u)
 
     # The forms ----------------------------------------------------------------------------------
 
-    def _condensedly(self, x: np.ndarray, guess: Plan | None, N: int) -> Resumable[LinearPlan]:
+    def _plan_condensed(self, x: np.ndarray, guess: Plan | None, N: int) -> Resumable[LinearPlan]:
         """The hard problem's plan; by the sparse form where the condensed one fails."""
         form, terms, data = yield from self._condense(N)
         begun = perf_counter()
@@ -144,34 +144,36 @@ class LinearPlanner:
         flag, W, rows, _, iterations = form.solve(data, x, active)
         seconds = perf_counter() - begun
         U = form.controls(W)
-        multipliers = self._split(form.sides, form.by_kind(rows))
-        plan = self._made(terms, self._rollout(terms, x, U), U, multipliers, iterations, seconds)
+        multipliers = self._split_multipliers(form.sides, form.split_by_kind(rows))
+        plan = self._make_plan(
+            terms, self._rollout(terms, x, U), U, multipliers, iterations, seconds
+        )
         if flag == SOLVED and plan.violation == 0.0:
             return plan
         if (flag == INFEASIBLE and form.trusted) or self.holds is not None:
-            return _not_found(plan, "Infeasible.")
-        return self._sparsely(x, N, hard=True)
+            return _failed_plan(plan, "Infeasible.")
+        return self._plan_sparse(x, N, hard=True)
 
-    def _sparsely(self, x: np.ndarray, N: int, hard: bool) -> LinearPlan:
+    def _plan_sparse(self, x: np.ndarray, N: int, hard: bool) -> LinearPlan:
         """The hard or the softened problem's plan."""
         key = N, hard
         if key not in self._sparse:
-            self._sparse[key] = Sparse(self.problem, N, None if hard else self.penalty)
+            self._sparse[key] = SparseQp(self.problem, N, None if hard else self.penalty)
         form, terms = self._sparse[key], ProblemTerms.of(self.problem, N)
         if key not in self._sparse_data:
             self._sparse_data[key] = form.data(terms)
         begun = perf_counter()
         found = form.solve(self._sparse_data[key], x)
         seconds = perf_counter() - begun
-        multipliers = self._split(form.sides, found.rows)
-        plan = self._made(terms, found.X, found.U, multipliers, found.iterations, seconds)
+        multipliers = self._split_multipliers(form.sides, found.rows)
+        plan = self._make_plan(terms, found.X, found.U, multipliers, found.iterations, seconds)
         if found.solved and (plan.violation == 0.0 or not hard):
             return plan
-        return _not_found(plan, "The interior-point method found no solution.")
+        return _failed_plan(plan, "The interior-point method found no solution.")
 
-    def _soften(self, x: np.ndarray, N: int, hard: LinearPlan) -> LinearPlan:
+    def _plan_softened(self, x: np.ndarray, N: int, hard: LinearPlan) -> LinearPlan:
         """The softened problem's plan."""
-        plan = self._sparsely(x, N, hard=False)
+        plan = self._plan_sparse(x, N, hard=False)
         seconds = {"QP": plan.seconds["QP"] + hard.seconds["QP"]}
         message = f"Softened: limits are exceeded by {plan.violation:.2g} in all."
         return replace(plan, message=message if plan.found else plan.message, seconds=seconds)
@@ -181,7 +183,7 @@ class LinearPlanner:
         pushes = (plan.multipliers[kind].max(initial=0.0) for kind in ("state", "terminal"))
         return self.penalty is not None and max(pushes) <= self.penalty
 
-    def _made(
+    def _make_plan(
         self,
         terms: ProblemTerms,
         X: np.ndarray,
@@ -192,9 +194,9 @@ class LinearPlanner:
     ) -> LinearPlan:
         """A plan as a solver left it, with by how much it exceeds what it should not."""
         excess = terms.excess(self.problem, X, U)
-        slack = {kind: MET * (1.0 + np.abs(terms.h[kind])) for kind in KINDS}
-        active = {k: (multipliers[k] > 0.0) & (multipliers[k] > -excess[k]) for k in KINDS}
-        over = sum(float(excess[k][excess[k] > slack[k]].sum()) for k in KINDS)
+        slack = {kind: LIMIT_TOLERANCE * (1.0 + np.abs(terms.h[kind])) for kind in LIMIT_KINDS}
+        active = {k: (multipliers[k] > 0.0) & (multipliers[k] > -excess[k]) for k in LIMIT_KINDS}
+        over = sum(float(excess[k][excess[k] > slack[k]].sum()) for k in LIMIT_KINDS)
         finite = bool(np.isfinite(X).all() and np.isfinite(U).all())
         return LinearPlan(
             X=X,
@@ -220,28 +222,30 @@ class LinearPlanner:
 
     def _condense(
         self, N: int
-    ) -> Resumable[tuple[Condensed, ProblemTerms, condensed.CondensedData]]:
+    ) -> Resumable[tuple[CondensedQp, ProblemTerms, condensed.CondensedData]]:
         """The condensed form over N steps, made once, with what this problem puts into it."""
         if N not in self._condensed:
-            self._condensed[N] = Condensed(self.problem, N, self.holds)
+            self._condensed[N] = CondensedQp(self.problem, N, self.holds)
             yield
         if N not in self._condensed_data:
             terms = ProblemTerms.of(self.problem, N)
             self._condensed_data[N] = terms, self._condensed[N].data(terms)
         return self._condensed[N], *self._condensed_data[N]
 
-    def _split(
-        self, sides: Mapping[str, TwoSided], rows: Mapping[str, np.ndarray]
+    def _split_multipliers(
+        self, sides: Mapping[str, TwoSidedLimits], rows: Mapping[str, np.ndarray]
     ) -> dict[str, np.ndarray]:
         """Multipliers of the joined rows as those of the sets' own."""
-        limits = sets(self.problem)
-        return {kind: sides[kind].split(rows[kind], len(limits[kind].h)) for kind in KINDS}
+        limits = limit_sets(self.problem)
+        return {kind: sides[kind].split(rows[kind], len(limits[kind].h)) for kind in LIMIT_KINDS}
 
-    def _active_rows(self, form: Condensed, active: Mapping[str, np.ndarray]) -> np.ndarray | None:
+    def _active_rows(
+        self, form: CondensedQp, active: Mapping[str, np.ndarray]
+    ) -> np.ndarray | None:
         """The joined rows' sides (rows,), where the guess has the limits and the horizon of this
         problem."""
-        parts, limits = [], sets(self.problem)
-        for kind in KINDS:
+        parts, limits = [], limit_sets(self.problem)
+        for kind in LIMIT_KINDS:
             steps, size = form.shapes[kind]
             given = active.get(kind)
             if given is None or given.shape != (steps, len(limits[kind].h)):
@@ -250,7 +254,7 @@ class LinearPlanner:
         return np.concatenate(parts)
 
 
-def _not_found(plan: LinearPlan, message: str) -> LinearPlan:
+def _failed_plan(plan: LinearPlan, message: str) -> LinearPlan:
     nothing: dict[str, np.ndarray] = {}
     return replace(
         plan, found=False, cost=np.nan, message=message, active=nothing, multipliers=nothing

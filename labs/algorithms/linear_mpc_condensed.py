@@ -16,17 +16,23 @@ from typing import NamedTuple
 import daqp
 import numpy as np
 
-from labs.algorithms.linear_mpc_limits import KINDS, ProblemTerms, TwoSided, sets, tolerance
+from labs.algorithms.linear_mpc_limits import (
+    LIMIT_KINDS,
+    ProblemTerms,
+    TwoSidedLimits,
+    limit_sets,
+    limit_tolerance,
+)
 from labs.problems.linear_mpc import LinearMpcProblem, check_holds
 
-SETTINGS = {"primal_tol": 1e-9, "dual_tol": 1e-9, "eq_reduction": -1}
+DAQP_SETTINGS = {"primal_tol": 1e-9, "dual_tol": 1e-9, "eq_reduction": -1}
 SOLVED, INFEASIBLE, FAILED = 1, -1, -9
 """DAQP's exit flags, but for the last, of what it does not take at all."""
 UPPER, LOWER, EQUALITY = 1, 3, 5
 """What DAQP is told of a row: that its upper or lower limit is active, that both always are."""
 LARGEST_CONDITION = 1e10
 """Of an H whose programme may be called infeasible by this form alone."""
-NO_GRIP = 1e-12
+NEGLIGIBLE_ROW = 1e-12
 """A row of G so small, next to its limit's own row, is one on which no control has a grip."""
 
 
@@ -38,11 +44,11 @@ class CondensedData(NamedTuple):
     lower: np.ndarray
     """(rows,) where x = 0."""
     upper: np.ndarray
-    free: tuple[np.ndarray, float]
+    uncontrolled_cost: tuple[np.ndarray, float]
     """V_N(x, 0) = x' M x / 2 + free[0]' x + free[1]."""
 
 
-class Condensed:
+class CondensedQp:
     """The programme over N steps, for every x and all terms."""
 
     def __init__(
@@ -58,7 +64,7 @@ class Condensed:
             Phi[k + 1] = problem.A @ Phi[k]
             Gamma[k + 1] = problem.A @ Gamma[k]
             Gamma[k + 1, :, k * m : (k + 1) * m] = problem.B
-        self.T = _held(N, m, problem.N, holds)
+        self.T = _move_blocking_matrix(N, m, problem.N, holds)
         self.Phi, self.Gamma = Phi, Gamma @ self.T
         weights = np.concatenate([np.tile(problem.Q, (N, 1, 1)), problem.Q_f[None]])
         weighted = weights @ self.Gamma
@@ -71,14 +77,16 @@ class Condensed:
         self.M = np.einsum("kia,kij,kjb->ab", Phi, weights, Phi)
         self._R = problem.R
         self._weights, self._A = weights, problem.A
-        self._rows(problem)
+        self._build_rows(problem)
         self._model: daqp.Model | None = None
 
-    def _rows(self, problem: LinearMpcProblem) -> None:
+    def _build_rows(self, problem: LinearMpcProblem) -> None:
         """G, E and, of every row, its step and kind."""
         N, m = self.N, self.m
-        self.sides = {kind: TwoSided.of(limits) for kind, limits in sets(problem).items()}
-        X, U, end = (self.sides[kind].H for kind in KINDS)
+        self.sides = {
+            kind: TwoSidedLimits.of(limits) for kind, limits in limit_sets(problem).items()
+        }
+        X, U, end = (self.sides[kind].H for kind in LIMIT_KINDS)
         controls = self.T.reshape(N, m, -1)
         G = [X @ self.Gamma[:-1], U @ controls, (end @ self.Gamma[-1])[None]]
         E = [X @ self.Phi[:-1], np.zeros((N, len(U), problem.n)), (end @ self.Phi[-1])[None]]
@@ -90,14 +98,14 @@ class Condensed:
         self.steps = np.concatenate(
             [np.repeat(step, length) for step, length in zip(steps, lengths, strict=True)]
         )
-        self.shapes = {kind: rows.shape[:2] for kind, rows in zip(KINDS, G, strict=True)}
+        self.shapes = {kind: rows.shape[:2] for kind, rows in zip(LIMIT_KINDS, G, strict=True)}
         size = np.concatenate(
             [
                 np.tile(np.linalg.norm(side.H, axis=1), len(step))
                 for side, step in zip(self.sides.values(), steps, strict=True)
             ]
         )
-        self.grip = np.linalg.norm(self.G, axis=1) > NO_GRIP * size
+        self.grip = np.linalg.norm(self.G, axis=1) > NEGLIGIBLE_ROW * size
         self._G = np.ascontiguousarray(self.G[self.grip])
 
     def data(self, terms: ProblemTerms) -> CondensedData:
@@ -114,7 +122,7 @@ class Condensed:
         controls = (terms.r - terms.u_ref @ self._R).ravel()
         lower, upper = [], []
         values = {"state": phi[:-1], "control": np.zeros((N, self.m)), "terminal": phi[-1:]}
-        for kind in KINDS:
+        for kind in LIMIT_KINDS:
             side = self.sides[kind]
             low, high = side.bounds(terms.h[kind])
             shift = values[kind] @ side.H.T
@@ -137,7 +145,7 @@ class Condensed:
         where the rows' `active` sides are 1 (upper) or -1 (lower)."""
         shift = self.E @ x
         lower, upper = data.lower - shift, data.upper - shift
-        if not self._met(lower, upper):
+        if not self._limits_consistent(lower, upper):
             return INFEASIBLE, np.zeros(len(self.H)), np.zeros(len(lower)), np.nan, 0
         low, high = lower[self.grip], upper[self.grip]
         f = self.F @ x + data.f
@@ -149,7 +157,7 @@ class Condensed:
         if self._model is None:
             self._model = daqp.Model()
             self._set_up = self._model.setup(self.H, f, self._G, high, low, sense)[0]
-            self._model.settings = SETTINGS
+            self._model.settings = DAQP_SETTINGS
         if self._set_up < 0:  # H has lost its digits
             return FAILED, np.zeros(len(self.H)), np.zeros(len(lower)), np.nan, 0
         # What it starts from is said anew, so that its answer depends on nothing that was before.
@@ -157,23 +165,23 @@ class Condensed:
         W, value, flag, info = self._model.solve()
         multipliers = np.zeros(len(lower))
         multipliers[self.grip] = info["lam"]
-        free = x @ self.M @ x / 2.0 + data.free[0] @ x + data.free[1]
+        free = x @ self.M @ x / 2.0 + data.uncontrolled_cost[0] @ x + data.uncontrolled_cost[1]
         return int(flag), W, multipliers, float(value + free), int(info["iterations"])
 
     def controls(self, W: np.ndarray) -> np.ndarray:
         """U (N, m) = T W."""
         return np.asarray((self.T @ W).reshape(self.N, self.m))
 
-    def by_kind(self, rows: np.ndarray) -> dict[str, np.ndarray]:
+    def split_by_kind(self, rows: np.ndarray) -> dict[str, np.ndarray]:
         """What is of the joined rows (rows,), kind by kind (steps, p)."""
-        sizes = [int(np.prod(self.shapes[kind])) for kind in KINDS]
+        sizes = [int(np.prod(self.shapes[kind])) for kind in LIMIT_KINDS]
         parts = np.split(rows, np.cumsum(sizes)[:-1])
-        return {k: part.reshape(self.shapes[k]) for k, part in zip(KINDS, parts, strict=True)}
+        return {k: part.reshape(self.shapes[k]) for k, part in zip(LIMIT_KINDS, parts, strict=True)}
 
-    def _met(self, lower: np.ndarray, upper: np.ndarray) -> bool:
+    def _limits_consistent(self, lower: np.ndarray, upper: np.ndarray) -> bool:
         """Whether no limit contradicts itself, and those without a grip are met as they are."""
         held = ~self.grip
-        slack = tolerance(np.where(np.isfinite(upper), upper, 0.0))
+        slack = limit_tolerance(np.where(np.isfinite(upper), upper, 0.0))
         return bool(
             (lower <= upper + slack).all()
             and (upper[held] >= -slack[held]).all()
@@ -181,7 +189,7 @@ class Condensed:
         )
 
 
-def _held(N: int, m: int, total: int, holds: Sequence[int] | None) -> np.ndarray:
+def _move_blocking_matrix(N: int, m: int, total: int, holds: Sequence[int] | None) -> np.ndarray:
     """T (N m, w)."""
     if holds is None:
         return np.eye(N * m)

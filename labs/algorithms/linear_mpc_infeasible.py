@@ -6,16 +6,16 @@ from dataclasses import dataclass
 import daqp
 import numpy as np
 
-from labs.algorithms.linear_mpc_condensed import SOLVED, Condensed, CondensedData
-from labs.algorithms.linear_mpc_limits import KINDS, sets, tolerance
+from labs.algorithms.linear_mpc_condensed import SOLVED, CondensedData, CondensedQp
+from labs.algorithms.linear_mpc_limits import LIMIT_KINDS, limit_sets, limit_tolerance
 from labs.problems.linear_mpc import LinearMpcProblem
 
-SETTINGS = {"primal_tol": 1e-9, "dual_tol": 1e-9}
-SMALL = 1e-6
+DAQP_SETTINGS = {"primal_tol": 1e-9, "dual_tol": 1e-9}
+CONTROL_WEIGHT = 1e-6
 """Weight of the controls beside that of the excess."""
 SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 SYMBOLS = {"state": "x", "control": "u", "terminal": "x"}
-NAMES = {"state": "X", "control": "U", "terminal": "the terminal set"}
+SET_NAMES = {"state": "X", "control": "U", "terminal": "the terminal set"}
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Infeasibility:
 
 
 def first_infeasibility(
-    problem: LinearMpcProblem, form: Condensed, data: CondensedData, x: np.ndarray
+    problem: LinearMpcProblem, form: CondensedQp, data: CondensedData, x: np.ndarray
 ) -> Infeasibility | None:
     """By bisection over the step, each time with the limits up to it alone; None where all can
     be met."""
@@ -67,11 +67,11 @@ def first_infeasibility(
             met = middle
         else:
             broken = middle
-    joined, excess = _worst(form, lower, upper, broken)
-    return _limit(problem, form, broken, joined, excess)
+    joined, excess = _largest_excess(form, lower, upper, broken)
+    return _exceeded_limit(problem, form, broken, joined, excess)
 
 
-def _feasible(form: Condensed, lower: np.ndarray, upper: np.ndarray, step: int) -> bool:
+def _feasible(form: CondensedQp, lower: np.ndarray, upper: np.ndarray, step: int) -> bool:
     """Whether controls of least norm meet the limits up to this step."""
     rows = form.steps <= step
     if (lower > upper + _slack(upper))[rows].any():
@@ -83,11 +83,13 @@ def _feasible(form: Condensed, lower: np.ndarray, upper: np.ndarray, step: int) 
     if not rows.any():
         return True
     size = form.H.shape[0]
-    flag = _least(np.eye(size), form.G[rows], lower[rows], upper[rows])[1]
+    flag = _minimise_norm(np.eye(size), form.G[rows], lower[rows], upper[rows])[1]
     return flag == SOLVED
 
 
-def _worst(form: Condensed, lower: np.ndarray, upper: np.ndarray, step: int) -> tuple[int, float]:
+def _largest_excess(
+    form: CondensedQp, lower: np.ndarray, upper: np.ndarray, step: int
+) -> tuple[int, float]:
     """The joined row at this step exceeded the most, and by how much (negative: its lower side),
     where those before are met and the sum of squares of the excesses is least."""
     before, here = (form.steps < step) & form.grip, form.steps == step
@@ -98,27 +100,27 @@ def _worst(form: Condensed, lower: np.ndarray, upper: np.ndarray, step: int) -> 
     low, high = (np.concatenate([side[before], side[here]]) for side in (lower, upper))
     # An empty pair of limits is exceeded by half its gap on either side.
     low[-slacks:] = np.minimum(low[-slacks:], high[-slacks:])
-    weights = np.concatenate([np.full(controls, SMALL), np.ones(slacks)])
-    z, flag = _least(np.diag(weights), G, low, high)
+    weights = np.concatenate([np.full(controls, CONTROL_WEIGHT), np.ones(slacks)])
+    z, flag = _minimise_norm(np.diag(weights), G, low, high)
     excess = z[controls:] if flag == SOLVED else np.zeros(slacks)
     worst = int(np.abs(excess).argmax())
     return int(np.flatnonzero(here)[worst]), float(excess[worst])
 
 
-def _limit(
-    problem: LinearMpcProblem, form: Condensed, step: int, joined: int, excess: float
+def _exceeded_limit(
+    problem: LinearMpcProblem, form: CondensedQp, step: int, joined: int, excess: float
 ) -> Infeasibility:
     """Of the joined row, the side that is exceeded."""
-    for kind in KINDS:
+    for kind in LIMIT_KINDS:
         steps, size = form.shapes[kind]
         if joined < steps * size:
             break
         joined -= steps * size
-    side, limits = form.sides[kind], sets(problem)[kind]
+    side, limits = form.sides[kind], limit_sets(problem)[kind]
     column = joined % size
     row = int(side.above[column] if excess >= 0.0 else side.below[column])
     text = limit_text(limits.H[row], float(limits.h[row]), SYMBOLS[kind])
-    text = text or f"row {row + 1} of {NAMES[kind]}"
+    text = text or f"row {row + 1} of {SET_NAMES[kind]}"
     return Infeasibility(step, kind, row, abs(excess), text)
 
 
@@ -128,28 +130,33 @@ def limit_text(row: np.ndarray, h: float, symbol: str) -> str:
     if len(used) == 1:
         i = int(used[0])
         sign = "≤" if row[i] > 0.0 else "≥"
-        return f"{symbol}{_index(i)} {sign} {h / row[i] + 0.0:.3g}"
+        return f"{symbol}{_subscript(i)} {sign} {h / row[i] + 0.0:.3g}"
     if len(used) != 2:
         return ""
     i, j = (int(k) for k in used)
     sign = "-" if row[j] < 0.0 else "+"
-    first, second = f"{row[i]:.3g} {symbol}{_index(i)}", f"{abs(row[j]):.3g} {symbol}{_index(j)}"
+    first, second = (
+        f"{row[i]:.3g} {symbol}{_subscript(i)}",
+        f"{abs(row[j]):.3g} {symbol}{_subscript(j)}",
+    )
     return f"{first} {sign} {second} ≤ {h:.3g}"
 
 
-def _index(i: int) -> str:
+def _subscript(i: int) -> str:
     return str(i + 1).translate(SUBSCRIPTS)
 
 
-def _least(
+def _minimise_norm(
     H: np.ndarray, G: np.ndarray, lower: np.ndarray, upper: np.ndarray
 ) -> tuple[np.ndarray, int]:
     """The least z' H z / 2 within lower <= G z <= upper, with DAQP's exit flag."""
     sense = np.where(upper - lower <= 0.0, 5, 0).astype(np.int32)
     zero = np.zeros(len(H))
-    z, _, flag, _ = daqp.solve(H, zero, np.ascontiguousarray(G), upper, lower, sense, **SETTINGS)
+    z, _, flag, _ = daqp.solve(
+        H, zero, np.ascontiguousarray(G), upper, lower, sense, **DAQP_SETTINGS
+    )
     return np.asarray(z), int(flag)
 
 
 def _slack(upper: np.ndarray) -> np.ndarray:
-    return tolerance(np.where(np.isfinite(upper), upper, 0.0))
+    return limit_tolerance(np.where(np.isfinite(upper), upper, 0.0))

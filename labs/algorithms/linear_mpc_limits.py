@@ -7,14 +7,14 @@ import numpy as np
 from labs.problems.linear_mpc import LinearMpcProblem
 from labs.problems.polyhedron import Polyhedron
 
-KINDS = ("state", "control", "terminal")
+LIMIT_KINDS = ("state", "control", "terminal")
 """X at x_0 ... x_(N-1), U at u_0 ... u_(N-1), X_f at x_N alone."""
-FEASIBLE = 1e-7
+FEASIBILITY_TOLERANCE = 1e-7
 """By how much of 1 + |h| a limit may be exceeded and count as met: what rounding and the solvers
 leave, period after period."""
 
 
-class TwoSided(NamedTuple):
+class TwoSidedLimits(NamedTuple):
     """lower <= H y <= upper: a polyhedron whose opposite rows are one. Half as many rows, and
     where both sides meet an equality, which no solver mistakes for two rows in conflict."""
 
@@ -26,7 +26,7 @@ class TwoSided(NamedTuple):
     """(p,) that of each lower one; -1: none."""
 
     @classmethod
-    def of(cls, limits: Polyhedron) -> "TwoSided":
+    def of(cls, limits: Polyhedron) -> "TwoSidedLimits":
         """Rows are joined only where they are opposite to the last digit."""
         seen: dict[bytes, int] = {}
         above: list[int] = []
@@ -92,13 +92,13 @@ class ProblemTerms(NamedTuple):
         return cls(
             N,
             np.zeros(n) if problem.c is None else problem.c,
-            _last(problem.x_ref, N + 1, n),
-            _last(problem.u_ref, N, m),
+            _last_rows(problem.x_ref, N + 1, n),
+            _last_rows(problem.u_ref, N, m),
             np.zeros(n) if problem.q is None else problem.q,
             np.zeros(m) if problem.r is None else problem.r,
             {
-                "state": X.h - _last(problem.state_margins, N, len(X.h)),
-                "control": U.h - _last(problem.control_margins, N, len(U.h)),
+                "state": X.h - _last_rows(problem.state_margins, N, len(X.h)),
+                "control": U.h - _last_rows(problem.control_margins, N, len(U.h)),
                 "terminal": np.zeros((1, 0)) if end is None else end.h[None],
             },
         )
@@ -114,12 +114,12 @@ class ProblemTerms(NamedTuple):
         self, problem: LinearMpcProblem, X: np.ndarray, U: np.ndarray
     ) -> dict[str, np.ndarray]:
         """By kind, how far each limit is exceeded (steps, rows); negative: how far it is away."""
-        sides = sets(problem)
+        sides = limit_sets(problem)
         values = {"state": X[:-1], "control": U, "terminal": X[-1:]}
-        return {kind: values[kind] @ sides[kind].H.T - self.h[kind] for kind in KINDS}
+        return {kind: values[kind] @ sides[kind].H.T - self.h[kind] for kind in LIMIT_KINDS}
 
 
-def sets(problem: LinearMpcProblem) -> dict[str, Polyhedron]:
+def limit_sets(problem: LinearMpcProblem) -> dict[str, Polyhedron]:
     """By kind; where there is no terminal set, one without rows."""
     end = problem.terminal_set
     none = Polyhedron(np.zeros((0, problem.n)), np.zeros(0))
@@ -130,12 +130,12 @@ def sets(problem: LinearMpcProblem) -> dict[str, Polyhedron]:
     }
 
 
-def tolerance(h: np.ndarray) -> np.ndarray:
+def limit_tolerance(h: np.ndarray) -> np.ndarray:
     """How far limits h may be exceeded and count as met."""
-    return np.asarray(FEASIBLE * (1.0 + np.abs(h)))
+    return np.asarray(FEASIBILITY_TOLERANCE * (1.0 + np.abs(h)))
 
 
-def _last(given: np.ndarray | None, steps: int, size: int) -> np.ndarray:
+def _last_rows(given: np.ndarray | None, steps: int, size: int) -> np.ndarray:
     """The last `steps` rows of what has a row a step, or one for all steps, or is zero. More than
     there are begin with the first repeated."""
     if given is None:

@@ -14,12 +14,12 @@ import numpy as np
 import piqp
 from scipy.sparse import block_diag, csc_matrix, eye_array, kron
 
-from labs.algorithms.linear_mpc_limits import KINDS, ProblemTerms, TwoSided, sets
+from labs.algorithms.linear_mpc_limits import LIMIT_KINDS, ProblemTerms, TwoSidedLimits, limit_sets
 from labs.problems.linear_mpc import LinearMpcProblem
 
 TOLERANCE = 1e-10
 """Of the programme's residuals and its duality gap, absolute and relative."""
-MOST_ITERATIONS = 100
+MAX_ITERATIONS = 100
 
 
 class SparseData(NamedTuple):
@@ -48,22 +48,24 @@ class SparseSolution(NamedTuple):
     iterations: int
 
 
-class Sparse:
+class SparseQp:
     """The programme over N steps, for every x and all terms; with a penalty, softened."""
 
     def __init__(self, problem: LinearMpcProblem, N: int, penalty: float | None = None) -> None:
         n, m = problem.n, problem.m
         self.N, self.n, self.penalty, self._problem = N, n, penalty, problem
-        self.sides = {kind: TwoSided.of(limits) for kind, limits in sets(problem).items()}
-        X, U, end = (self.sides[kind].H for kind in KINDS)
+        self.sides = {
+            kind: TwoSidedLimits.of(limits) for kind, limits in limit_sets(problem).items()
+        }
+        X, U, end = (self.sides[kind].H for kind in LIMIT_KINDS)
         blocks, weights, starts, rows, z = [], [], [], [], 0
-        self.row_at: dict[str, list[np.ndarray]] = {kind: [] for kind in KINDS}
+        self.row_at: dict[str, list[np.ndarray]] = {kind: [] for kind in LIMIT_KINDS}
         at = 0
         for k in range(N):
             kind, limits = ("state", X) if k + 1 < N else ("terminal", end)
             soft = len(limits) if penalty is not None else 0
             starts.append(z)
-            blocks.append(_stage(U, limits, soft, n))
+            blocks.append(_stage_limits(U, limits, soft, n))
             Q = problem.Q if kind == "state" else problem.Q_f
             weights.append(block_diag([problem.R, Q, np.zeros((soft, soft))]))
             self.row_at["control"].append(at + np.arange(len(U)))
@@ -98,7 +100,7 @@ class Sparse:
         lower, upper = np.full(self.G.shape[0], -np.inf), np.full(self.G.shape[0], np.inf)
         if self.penalty is not None:
             lower[:] = 0.0  # of the slacks; the other rows follow
-        for kind in KINDS:
+        for kind in LIMIT_KINDS:
             low, high = self.sides[kind].bounds(terms.h[kind])
             first = len(low) - len(self.row_at[kind])  # X limits x_0 as well, which is given
             for at, below, above in zip(self.row_at[kind], low[first:], high[first:], strict=True):
@@ -117,7 +119,7 @@ class Sparse:
         if solver is None:
             solver = self._solver = piqp.SparseSolver()
             solver.settings.kkt_solver = piqp.KKTSolver.sparse_multistage
-            solver.settings.max_iter = MOST_ITERATIONS
+            solver.settings.max_iter = MAX_ITERATIONS
             solver.settings.preconditioner_scale_cost = True
             solver.settings.check_duality_gap = True
             for name in ("eps_abs", "eps_rel", "eps_duality_gap_abs", "eps_duality_gap_rel"):
@@ -134,7 +136,7 @@ class Sparse:
             solved,
             np.vstack([x, z[self.x_at]]),
             z[self.u_at],
-            {kind: self._multipliers(pushes, kind) for kind in KINDS},
+            {kind: self._multipliers(pushes, kind) for kind in LIMIT_KINDS},
             int(found.info.iter),
         )
 
@@ -150,7 +152,7 @@ class Sparse:
         return np.vstack([np.zeros((1, p)), found.reshape(self.N - 1, p)])
 
 
-def _stage(U: np.ndarray, limits: np.ndarray, soft: int, n: int) -> np.ndarray:
+def _stage_limits(U: np.ndarray, limits: np.ndarray, soft: int, n: int) -> np.ndarray:
     """The rows of a stage's limits on (u, x): U u and H x. Softened, on (u, x, s): U u, H x - s,
     H x + s and s."""
     if not soft:

@@ -28,11 +28,11 @@ from labs.algorithms.monte_carlo import costs_to_go
 from labs.algorithms.temporal_difference import n_step_return
 from labs.compiled import compiled, inlined
 from labs.problems.episodes import UpdateRule, step_size
-from labs.problems.prediction import Episode, PredictionTask, importance
+from labs.problems.prediction import Episode, PredictionTask, importance_ratio
 
 
 @inlined
-def _move(
+def _update_weights(
     features: Features,
     rule: UpdateRule,
     w: np.ndarray,
@@ -60,7 +60,7 @@ def gradient_oracle(
     """The true value of the policy asked for is the target, whichever is followed."""
     for t in range(T):
         x = episode.states[t]
-        _move(features, rule, w, count, x, task.truth[x])
+        _update_weights(features, rule, w, count, x, task.truth[x])
 
 
 @compiled
@@ -78,7 +78,7 @@ def gradient_monte_carlo(
         return
     costs_to_go(task.task.gamma, episode, T, 0.0)
     for t in range(T):
-        _move(features, rule, w, count, episode.states[t], episode.returns[t])
+        _update_weights(features, rule, w, count, episode.states[t], episode.returns[t])
 
 
 @compiled
@@ -95,8 +95,8 @@ def semi_gradient_td(
     for t in range(T):
         x, y = episode.states[t], episode.states[t + 1]
         target = episode.costs[t] + task.task.gamma * evaluate(features, w, y)
-        rho = importance(task, x, episode.controls[t])
-        _move(features, rule, w, count, x, target, rho)
+        rho = importance_ratio(task, x, episode.controls[t])
+        _update_weights(features, rule, w, count, x, target, rho)
 
 
 @compiled
@@ -114,10 +114,10 @@ def semi_gradient_n_step(
     for t in range(first):
         rest = evaluate(features, w, states[t + rule.n])
         J = n_step_return(gamma, episode, t, rule.n, rest)
-        _move(features, rule, w, count, states[t], J)
+        _update_weights(features, rule, w, count, states[t], J)
     costs_to_go(gamma, episode, T, evaluate(features, w, states[T]), first)
     for t in range(first, T):
-        _move(features, rule, w, count, states[t], episode.returns[t])
+        _update_weights(features, rule, w, count, states[t], episode.returns[t])
 
 
 @compiled
@@ -135,7 +135,7 @@ def semi_gradient_lambda(
     for t in range(T):
         x, y = episode.states[t], episode.states[t + 1]
         count[0] += 1
-        rho, alpha = importance(task, x, episode.controls[t]), step_size(rule, count[0])
+        rho, alpha = importance_ratio(task, x, episode.controls[t]), step_size(rule, count[0])
         fading = rho * gamma * rule.trace_decay
         for i in range(len(w)):
             trace[i] *= fading
@@ -162,7 +162,7 @@ def gradient_td(
     for t in range(T):
         x, y = episode.states[t], episode.states[t + 1]
         count[0] += 1
-        rho, alpha = importance(task, x, episode.controls[t]), step_size(rule, count[0])
+        rho, alpha = importance_ratio(task, x, episode.controls[t]), step_size(rule, count[0])
         target = episode.costs[t] + gamma * evaluate(features, w, y)
         delta, expected = target - evaluate(features, w, x), evaluate(features, h, x)
         add_features(features, w, x, alpha * rho * delta)

@@ -21,7 +21,7 @@ import numpy as np
 from labs.errors import LabError
 from labs.problems.polyhedron import Polyhedron
 
-DOUBLINGS = 60
+MAX_DOUBLINGS = 60
 """Of a sum of A'^k Q A^k, in which terms die out unless |A| is one to a relative 1e-17."""
 
 
@@ -84,7 +84,7 @@ def solve_lyapunov(A: np.ndarray, Q: np.ndarray) -> np.ndarray:
             f"no P: A has an eigenvalue of magnitude {radius:.6g}, and the system must be stable"
         )
     P, power = 0.5 * (Q + Q.T), A
-    for _ in range(DOUBLINGS):
+    for _ in range(MAX_DOUBLINGS):
         more = power.T @ P @ power
         P, power = P + more, power @ power
         if np.abs(more).max() <= 1e-17 * np.abs(P).max():

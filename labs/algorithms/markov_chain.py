@@ -52,7 +52,7 @@ class CostToGo:
     """(X,) bool: where they have one. All of them for gamma < 1."""
 
     @property
-    def known(self) -> np.ndarray:
+    def values_or_nan(self) -> np.ndarray:
         """(X,) V, and NaN where it has no value."""
         return np.where(self.finite, self.V, np.nan)
 
@@ -147,7 +147,7 @@ def absorption(P: np.ndarray, classes: list[CommunicatingClass]) -> np.ndarray:
     return ends
 
 
-def long_run(P: np.ndarray, classes: list[CommunicatingClass]) -> np.ndarray:
+def long_run_distribution(P: np.ndarray, classes: list[CommunicatingClass]) -> np.ndarray:
     """(X, X), in row x the share of time spent in each state in the long run by one who starts
     in x: the limit of (I + P + ... + P^(n-1)) / n, which exists for every P."""
     shares = np.stack([stationary_distribution(P, c) for c in classes if c.closed])
@@ -184,7 +184,7 @@ def cost_to_go(
     return CostToGo(np.where(finite, V, 0.0), finite)
 
 
-def mean_costs(
+def normalized_discounted_costs(
     P: np.ndarray, C: np.ndarray, gammas: np.ndarray, classes: list[CommunicatingClass]
 ) -> np.ndarray:
     """(len(gammas), X): (1 - gamma) V, the costs ahead averaged with weights (1 - gamma) gamma^k
@@ -192,7 +192,7 @@ def mean_costs(
     in the long run."""
     near = gammas < 1.0
     means = np.empty((len(gammas), len(P)))
-    means[~near] = long_run(P, classes) @ C
+    means[~near] = long_run_distribution(P, classes) @ C
     systems = np.eye(len(P)) - gammas[near, None, None] * P
     weighed = (1.0 - gammas[near])[:, None, None] * C[:, None]
     means[near] = np.linalg.solve(systems, weighed)[:, :, 0]
@@ -230,7 +230,9 @@ def iterate_values(
         if sums and errors[-1] <= goal:
             done, progress = f"V is exact to nine digits of its largest entry, k = {k}.", 1.0
         elif k == most:
-            left = f"an error of {errors[-1]:.2g} is left" if sums else _without_limit(exact.finite)
+            left = (
+                f"an error of {errors[-1]:.2g} is left" if sums else _no_limit_message(exact.finite)
+            )
             done = f"Stopped at k = {k}: {left}."
         elif sums and gap > goal:
             progress = max(progress, float(np.log(gap / errors[-1]) / np.log(gap / goal)))
@@ -241,6 +243,6 @@ def iterate_values(
             return
 
 
-def _without_limit(finite: np.ndarray) -> str:
+def _no_limit_message(finite: np.ndarray) -> str:
     some = f" in {int((~finite).sum())} of {len(finite)} states" if finite.any() else ""
     return f"V has no limit{some}"

@@ -43,7 +43,7 @@ def every_visit(
     """Every-visit Monte Carlo."""
     if ended:
         costs_to_go(gamma, episode, T, 0.0)
-        move_to_returns(episode, T, rule, V, N)
+        update_to_returns(episode, T, rule, V, N)
 
 
 @compiled
@@ -65,23 +65,23 @@ def first_visit(
         x = episode.states[t]
         if not seen[x]:
             seen[x] = True
-            move(rule, V, N, V, x, episode.returns[t])
+            update_value(rule, V, N, V, x, episode.returns[t])
 
 
 @compiled
-def move_to_returns(
+def update_to_returns(
     episode: Episode, T: int, rule: UpdateRule, V: np.ndarray, N: np.ndarray
 ) -> None:
     """Moves the value of each state of an episode towards its return."""
     learned = V.copy() if rule.offline else V
     for t in range(T):
-        move(rule, V, N, learned, episode.states[t], episode.returns[t])
+        update_value(rule, V, N, learned, episode.states[t], episode.returns[t])
     if rule.offline:
         V[:] = learned
 
 
 @inlined
-def move(
+def update_value(
     rule: UpdateRule, V: np.ndarray, N: np.ndarray, learned: np.ndarray, x: int, target: float
 ) -> None:
     """The next update of V(x), into `learned`: V itself, or a copy while V stands still."""

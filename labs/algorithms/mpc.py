@@ -21,7 +21,7 @@ from labs.errors import LabError
 from labs.problems.receding_horizon import Plan, Planner
 from labs.resumable import Resumable
 
-Model = Callable[[np.ndarray, np.ndarray], np.ndarray]
+PredictionModel = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """x+ (nx,) of x (nx,) and u (nu,)."""
 
 
@@ -51,7 +51,7 @@ class MpcOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class RecedingHorizon:
+class RecedingHorizonState:
     """The controller between two periods: plain finite data, without durations, never written into
     again."""
 
@@ -75,20 +75,20 @@ class RecedingHorizon:
     """and the same with when that was and what acts instead."""
 
 
-def init(options: MpcOptions, rest: np.ndarray) -> RecedingHorizon:
+def init(options: MpcOptions, rest: np.ndarray) -> RecedingHorizonState:
     """Before the first period; `rest` (nu,) acts until the first plan does."""
-    return RecedingHorizon(0, rest, np.tile(rest, (options.delay, 1)))
+    return RecedingHorizonState(0, rest, np.tile(rest, (options.delay, 1)))
 
 
 def step(
     planner: Planner,
-    model: Model,
+    model: PredictionModel,
     options: MpcOptions,
-    at: RecedingHorizon,
+    at: RecedingHorizonState,
     x: np.ndarray,
     brake: np.ndarray,
     replan: bool = True,
-) -> Resumable[RecedingHorizon]:
+) -> Resumable[RecedingHorizonState]:
     """One period: the measured state x (nx,) in, u (nu,) out. `brake` (nu,) acts where there is no
     plan. Without `replan` the last plan goes on and nothing is solved."""
     start = x
@@ -107,22 +107,22 @@ def step(
             failed = found.message.rstrip(".") + "."
     age = 0 if replan and not failed else at.age + 1
     goes_on = plan is not None and age < len(plan.U) and (options.fallback == "tail" or not failed)
-    chosen = control(plan, age, start) if plan is not None and goes_on else brake
+    chosen = plan_control(plan, age, start) if plan is not None and goes_on else brake
     queue = np.concatenate([at.committed, chosen[None]])
-    return RecedingHorizon(
+    return RecedingHorizonState(
         period=at.period + 1,
         u=queue[0],
         committed=queue[1:],
         plan=plan,
         age=age,
-        guess=None if plan is None else shift(plan, age + 1, model, options),
+        guess=None if plan is None else shift_plan(plan, age + 1, model, options),
         failures=at.failures + bool(failed),
         why=failed,
-        status=failed and _status(at.period, failed, age if goes_on else None),
+        status=failed and _status_message(at.period, failed, age if goes_on else None),
     )
 
 
-def control(plan: Plan, age: int, x: np.ndarray) -> np.ndarray:
+def plan_control(plan: Plan, age: int, x: np.ndarray) -> np.ndarray:
     """What a plan says to do at the state x (nx,), `age` periods after it began: u (nu,)."""
     if plan.K is None:
         return np.asarray(plan.U[age])
@@ -135,7 +135,7 @@ def horizon(options: MpcOptions, period: int) -> int | None:
     return None if first is None else first - period % first
 
 
-def shift(plan: Plan, steps: int, model: Model, options: MpcOptions) -> Plan | None:
+def shift_plan(plan: Plan, steps: int, model: PredictionModel, options: MpcOptions) -> Plan | None:
     """The plan `steps` periods later: a guess, found by nobody and without a cost; None after the
     plan's end. Its last controls are zero or repeated, and its last states follow from the model;
     a horizon that shrinks loses them instead."""
@@ -153,11 +153,11 @@ def shift(plan: Plan, steps: int, model: Model, options: MpcOptions) -> Plan | N
     return Plan(X, U, 0.0, False, "the plan before, shifted", active)
 
 
-def _status(period: int, why: str, age: int | None) -> str:
+def _status_message(period: int, why: str, age: int | None) -> str:
     """A sentence of when, why and what acts instead."""
-    acts = "the brake acts" if age is None else f"the plan of {_periods(age)} before goes on"
+    acts = "the brake acts" if age is None else f"the plan of {_periods_text(age)} before goes on"
     return f"No plan in period {period}: {why} Instead {acts}."
 
 
-def _periods(count: int) -> str:
+def _periods_text(count: int) -> str:
     return "one period" if count == 1 else f"{count} periods"

@@ -22,13 +22,13 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from labs.algorithms.assembly import Assembly, MatrixTerms
-from labs.algorithms.multiple_shooting_segments import Segments, congruent_sums, own_terms
+from labs.algorithms.multiple_shooting_segments import Segments, congruent_sums, masked_block_terms
 from labs.algorithms.shooting_steps import (
     CostForm,
     ShootingSteps,
     StepDerivatives,
-    advance,
-    method_of,
+    integrate_step,
+    shooting_method,
 )
 from labs.algorithms.state_constraints import StateConstraints
 from labs.errors import LabError
@@ -77,7 +77,7 @@ class MultipleShooting:
         method: str = "rk4",
         form: CostForm = "augmented",
     ) -> None:
-        scheme = method_of(method, N, M)
+        scheme = shooting_method(method, N, M)
         if not 1 <= segments <= N:
             raise LabError(f"{segments} segments: there are from 1 to as many as pieces, N = {N}")
         self.problem, self.N, self.M = problem, N, M
@@ -145,7 +145,7 @@ class MultipleShooting:
                 rows = cut.first_steps[:running] + j
                 X[rows] = x = x[:running]
                 stages = np.empty((P.shape[1], *x.shape))
-                Y[rows] = x = advance(rates, self.steps.method, x, W[rows, :-1], h, stages)
+                Y[rows] = x = integrate_step(rates, self.steps.method, x, W[rows, :-1], h, stages)
                 P[rows] = stages.swapaxes(0, 1)
             diverged = not (np.abs(Y).max() <= LARGEST_STATE and np.isfinite(z).all())
         self._arcs = Arcs(z.copy(), W, X, Y, P, diverged)
@@ -216,7 +216,7 @@ class MultipleShooting:
             p = self._costates(arcs, at, final_x, lam, mu)
             H = yield from self.steps.hamiltonian_hessian(arcs.X, arcs.W, p)
             ends, last = arcs.Y[self.M - 1 :: self.M], lam[cut.m * self.nx :]
-            bent = self._constraints.curvature(ends, self._of_all(mu), last)
+            bent = self._constraints.curvature(ends, self._all_inequality_multipliers(mu), last)
             at_ends += yield from bent
         at_ends[-1] += final_xx
         Z = np.concatenate([X_z, cut.w_z], axis=1)
@@ -267,16 +267,16 @@ class MultipleShooting:
             (size + ends, self.n),
             1 + joints + ends * k,
             MatrixTerms(rows.ravel(), cut.starts.ravel(), none, np.ones(size)),
-            own_terms(rows[1:], cut.columns[:-1], 1, -1.0),
-            own_terms(size + np.arange(ends)[None], cut.columns[-1:], 1 + joints),
+            masked_block_terms(rows[1:], cut.columns[:-1], 1, -1.0),
+            masked_block_terms(size + np.arange(ends)[None], cut.columns[-1:], 1 + joints),
         )
         rows = np.where(self._asked, np.cumsum(self._asked).reshape(self._asked.shape) - 1, -1)
         shape = (int(self._asked.sum()), self.n)
-        g_z = Assembly(shape, rows.size * k, own_terms(rows, cut.columns_by_piece, 0))
-        blocks = own_terms(cut.columns, cut.columns, 0)
+        g_z = Assembly(shape, rows.size * k, masked_block_terms(rows, cut.columns_by_piece, 0))
+        blocks = masked_block_terms(cut.columns, cut.columns, 0)
         return c_z, g_z, Assembly((self.n, self.n), m * k * k, blocks)
 
-    def _of_all(self, mu: np.ndarray) -> np.ndarray:
+    def _all_inequality_multipliers(self, mu: np.ndarray) -> np.ndarray:
         """(N, size): the multipliers, 0 of inequalities that are not asked for."""
         found = np.zeros(self._asked.shape)
         found[self._asked] = mu
@@ -290,7 +290,7 @@ class MultipleShooting:
         cut, constraints = self.segments, self._constraints
         p, ends = np.zeros_like(arcs.Y), slice(self.M - 1, None, self.M)
         g_x = constraints.jacobians(arcs.Y[ends])
-        p[ends] = np.einsum("kmi,km->ki", g_x, self._of_all(mu))
+        p[ends] = np.einsum("kmi,km->ki", g_x, self._all_inequality_multipliers(mu))
         p[cut.first_steps[1:] - 1] -= lam[self.nx : cut.m * self.nx].reshape(-1, self.nx)
         p[-1] += final_x + lam[cut.m * self.nx :] @ constraints.end_jacobian(arcs.Y[-1])
         starts = set(cut.first_steps.tolist())

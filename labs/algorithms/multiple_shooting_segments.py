@@ -62,7 +62,7 @@ class Segments:
         return np.bincount(self.columns[own], of_segment[own], minlength=self.n)
 
 
-def own_terms(
+def masked_block_terms(
     rows: np.ndarray, columns: np.ndarray, first: int, coefficient: float = 1.0
 ) -> MatrixTerms:
     """`block_terms` without those of variables -1."""

@@ -55,7 +55,7 @@ def forward(sizes: np.ndarray, w: np.ndarray, x: np.ndarray, memory: np.ndarray)
 
 
 @compiled
-def backward(
+def backpropagate(
     sizes: np.ndarray, w: np.ndarray, memory: np.ndarray, dy: np.ndarray, gradient: np.ndarray
 ) -> None:
     """Writes dF/dw into `gradient`, given dF/dy (n, .) and what `forward` kept in `memory`."""
@@ -79,7 +79,7 @@ def backward(
                         d[i, j] = 0.0
 
 
-class Adam(NamedTuple):
+class AdamState(NamedTuple):
     """Moments of the gradient (Kingma and Ba, 2015); arrays change in place."""
 
     mean: np.ndarray
@@ -90,16 +90,18 @@ class Adam(NamedTuple):
     """(1,) int64: done so far."""
 
 
-MEAN_DECAY, SQUARE_DECAY, SMALL = 0.9, 0.999, 1e-8
+MEAN_DECAY, SQUARE_DECAY, ADAM_EPSILON = 0.9, 0.999, 1e-8
 
 
-def no_moments(count: int) -> Adam:
+def zero_moments(count: int) -> AdamState:
     """Before the first step, for `count` weights."""
-    return Adam(np.zeros(count, np.float32), np.zeros(count, np.float32), np.zeros(1, np.int64))
+    return AdamState(
+        np.zeros(count, np.float32), np.zeros(count, np.float32), np.zeros(1, np.int64)
+    )
 
 
 @compiled
-def adam_step(adam: Adam, w: np.ndarray, gradient: np.ndarray, rate: float) -> None:
+def adam_step(adam: AdamState, w: np.ndarray, gradient: np.ndarray, rate: float) -> None:
     """w <- w - rate m / (sqrt(s) + 1e-8), with mean m and square s of g freed of the bias of their
     beginning at zero."""
     adam.steps[0] += 1
@@ -110,4 +112,4 @@ def adam_step(adam: Adam, w: np.ndarray, gradient: np.ndarray, rate: float) -> N
         g = gradient[i]
         adam.mean[i] += (1.0 - MEAN_DECAY) * (g - adam.mean[i])
         adam.square[i] += (1.0 - SQUARE_DECAY) * (g * g - adam.square[i])
-        w[i] -= by_mean * adam.mean[i] / (np.sqrt(by_square * adam.square[i]) + SMALL)
+        w[i] -= by_mean * adam.mean[i] / (np.sqrt(by_square * adam.square[i]) + ADAM_EPSILON)

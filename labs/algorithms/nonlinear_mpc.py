@@ -29,18 +29,18 @@ from labs.resumable import Resumable, timed
 
 TOLERANCE = 1e-4
 """A step that changes no state or control by more, in parts of one plus its size, has converged."""
-MOST_ITERATIONS = 30
+MAX_ITERATIONS = 30
 """Before a solve to convergence stops short."""
 AT_LIMIT = 1e-5
 """What is so near a limit, in parts of one plus its size, is at it."""
-DIVERGED = 1e6
+DIVERGENCE_LIMIT = 1e6
 """No state is as large as this."""
-ONE_STEP, TO_CONVERGENCE = 1e-8, 1e-10
+REAL_TIME_TOLERANCE, CONVERGENCE_TOLERANCE = 1e-8, 1e-10
 """What the quadratic programmes are solved to. Where a limit is only just active, states are known
 to the root of it."""
-KEPT = 4
+MAX_CACHED_HORIZONS = 4
 """Lengths of horizon whose programmes are kept."""
-ELASTIC = 1e4
+ELASTIC_PENALTY = 1e4
 """gamma of the programme that says by how much an infeasible one is missed."""
 
 
@@ -53,11 +53,13 @@ class NonlinearMpc:
         if iterations is not None and iterations < 1:
             raise LabError(f"{iterations} iterations a period: it takes at least one")
         self.problem, self.iterations = problem, iterations
-        tolerance = TO_CONVERGENCE if iterations is None else ONE_STEP
-        self._qp = lru_cache(KEPT)(lambda N: StageQp(problem, N, tolerance))
-        self._elastic = lru_cache(1)(lambda N: StageQp(replace(problem, penalty=ELASTIC), N))
+        tolerance = CONVERGENCE_TOLERANCE if iterations is None else REAL_TIME_TOLERANCE
+        self._qp = lru_cache(MAX_CACHED_HORIZONS)(lambda N: StageQp(problem, N, tolerance))
+        self._elastic = lru_cache(1)(
+            lambda N: StageQp(replace(problem, penalty=ELASTIC_PENALTY), N)
+        )
 
-    def aimed(self, x_ref: np.ndarray, u_ref: np.ndarray) -> Self:
+    def with_reference(self, x_ref: np.ndarray, u_ref: np.ndarray) -> Self:
         """The same with another x_ref (nx,) and u_ref (nu,): what is set up is shared."""
         other = copy(self)
         other.problem = replace(self.problem, x_ref=x_ref, u_ref=u_ref)
@@ -73,9 +75,9 @@ class NonlinearMpc:
     def _plan(
         self, x: np.ndarray, guess: Plan | None, N: int, seconds: dict[str, float]
     ) -> Resumable[Plan]:
-        qp, step = self._qp(N), StageStep(*self._first(x, guess, N), np.zeros(N))
-        qp.aim(self.problem)
-        most, iteration, change, gap = self.iterations or MOST_ITERATIONS, 0, np.inf, np.inf
+        qp, step = self._qp(N), StageStep(*self._initial_trajectory(x, guess, N), np.zeros(N))
+        qp.set_reference(self.problem)
+        most, iteration, change, gap = self.iterations or MAX_ITERATIONS, 0, np.inf, np.inf
         while iteration < most and change > TOLERANCE:
             if iteration:
                 yield
@@ -86,10 +88,10 @@ class NonlinearMpc:
             found = qp.solve(at)
             seconds["derivatives"] += linearized - begun
             seconds["QP"] += perf_counter() - linearized
-            if found is None or not np.abs(found.X).max() < DIVERGED:
-                return self._none(at, iteration, diverged=found is not None)
+            if found is None or not np.abs(found.X).max() < DIVERGENCE_LIMIT:
+                return self._failed_plan(at, iteration, diverged=found is not None)
             gap = float(np.abs(at.Y - at.X[1:]).max())
-            change = max(_change(found.X, step.X), _change(found.U, step.U))
+            change = max(_relative_change(found.X, step.X), _relative_change(found.U, step.U))
             step = found
         penalty = (self.problem.penalty or 0.0) * step.s.sum()
         return Plan(
@@ -98,7 +100,7 @@ class NonlinearMpc:
             self.problem.cost(step.X, step.U) + float(penalty),
             found=True,
             message=self._message(iteration, change),
-            active=self.active(step.X, step.U),
+            active=self.active_limits(step.X, step.U),
             violation=float(step.s.max()),
             iterations=iteration,
             gap=gap,
@@ -113,21 +115,23 @@ class NonlinearMpc:
             return Linearization(X, U, Y, A, B, none[:, :, 0], none)
         return Linearization(X, U, Y, A, B, path.values(X[1:]), path.jacobians(X[1:]))
 
-    def active(self, X: np.ndarray, U: np.ndarray) -> dict[str, np.ndarray]:
+    def active_limits(self, X: np.ndarray, U: np.ndarray) -> dict[str, np.ndarray]:
         """By kind, which limits a plan is at or beyond: "position" and "velocity" (N + 1, nq),
         "control" (N, nu), and where there is g, "path" (N + 1, size)."""
         p, n = self.problem, self.problem.nx // 2
-        at = _at(X, p.x_lower, p.x_upper)
+        at = _at_limit(X, p.x_lower, p.x_upper)
         found = {
             "position": at[:, :n],
             "velocity": at[:, n:],
-            "control": _at(U, p.u_lower, p.u_upper),
+            "control": _at_limit(U, p.u_lower, p.u_upper),
         }
         if p.path:
             found["path"] = p.path.values(X) >= -AT_LIMIT
         return found
 
-    def _first(self, x: np.ndarray, guess: Plan | None, N: int) -> tuple[np.ndarray, np.ndarray]:
+    def _initial_trajectory(
+        self, x: np.ndarray, guess: Plan | None, N: int
+    ) -> tuple[np.ndarray, np.ndarray]:
         """The trajectory to begin with, from x. A longer guess is cut, a shorter one held."""
         if guess is None:
             X, U = np.tile(x, (N + 1, 1)), np.tile(self.problem.u_ref, (N, 1))
@@ -148,20 +152,20 @@ class NonlinearMpc:
             )
         return f"The last iteration changed the trajectory by {change:.1e}."
 
-    def _none(self, at: Linearization, iteration: int, *, diverged: bool) -> Plan:
+    def _failed_plan(self, at: Linearization, iteration: int, *, diverged: bool) -> Plan:
         """No plan, and why: the limit that is exceeded most if it has to be."""
         message = "The iterations diverge. Start from a nearer guess."
         if not diverged:
             message = "The solver of the quadratic programme failed."
             elastic = None if self.problem.soft else self._elastic(len(at.U))
             if elastic:
-                elastic.aim(replace(self.problem, penalty=ELASTIC))
+                elastic.set_reference(replace(self.problem, penalty=ELASTIC_PENALTY))
             least = elastic.solve(at) if elastic else None
             if least and least.s.max() > AT_LIMIT:
-                message = self._infeasible(least)
+                message = self._infeasible_message(least)
         return Plan(at.X, at.U, np.nan, False, message, iterations=iteration)
 
-    def _infeasible(self, least: StageStep) -> str:
+    def _infeasible_message(self, least: StageStep) -> str:
         """What is exceeded, and when, by the trajectory that exceeds limits least."""
         p, n = self.problem, self.problem.nx // 2
         X = least.X[1:]
@@ -177,7 +181,7 @@ class NonlinearMpc:
         )
 
 
-def _at(x: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+def _at_limit(x: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     """Whether x is at or beyond a limit; never one that is infinite."""
     with np.errstate(invalid="ignore"):
         below = x <= lower + AT_LIMIT * (1.0 + np.abs(lower))
@@ -185,5 +189,5 @@ def _at(x: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     return np.asarray(below | above)
 
 
-def _change(new: np.ndarray, old: np.ndarray) -> float:
+def _relative_change(new: np.ndarray, old: np.ndarray) -> float:
     return float((np.abs(new - old) / (1.0 + np.abs(old))).max())

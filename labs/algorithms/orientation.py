@@ -12,7 +12,7 @@ import numpy as np
 
 SEQUENCES = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx", "xyx", "xzx", "yxy", "yzy", "zxz", "zyz")
 """Three different axes (Cardan angles), then those whose third axis is the first again."""
-LOCK_TOLERANCE = 1e-12
+GIMBAL_LOCK_TOLERANCE = 1e-12
 """Sine of the angle between first and third axis below which they count as one: psi is then 0."""
 
 
@@ -65,7 +65,7 @@ def matrix_to_euler(sequence: str, rotation: np.ndarray) -> np.ndarray:
         free = np.hypot(r[i, j], r[i, k])
         theta = np.arctan2(free, r[i, i])
         phi = np.arctan2(r[j, i], -s * r[k, i])
-    if free < LOCK_TOLERANCE:
+    if free < GIMBAL_LOCK_TOLERANCE:
         return np.array([np.arctan2(s * r[k, j], r[j, j]), theta, 0.0])
     row = (
         elementary_rotation(sequence[0], phi).T[j] @ r
@@ -104,14 +104,14 @@ def euler_rates(sequence: str, angles: np.ndarray, omega: np.ndarray) -> np.ndar
     return rates
 
 
-def lock_sine(sequence: str, theta: float) -> float:
+def gimbal_lock_sine(sequence: str, theta: float) -> float:
     """|cos(theta)| with three axes, |sin(theta)| with two: the sine of the angle between the first
     and the third axis. It is 0 at the lock, and the fastest an angle may have to turn at unit
     angular speed, over all directions of rotation, is exactly its inverse."""
     return float(abs(np.cos(theta) if sequence[2] != sequence[0] else np.sin(theta)))
 
 
-def lost_direction(sequence: str, phi: float) -> np.ndarray:
+def gimbal_lock_direction(sequence: str, phi: float) -> np.ndarray:
     """(3,) the direction e_a x R_a(phi) e_b: at the lock no combination of the three angles' rates
     is a rotation about it."""
     a, b = ("xyz".index(axis) for axis in sequence[:2])

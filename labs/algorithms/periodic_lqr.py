@@ -24,12 +24,12 @@ from labs.algorithms.riccati_recursion import relative_change
 from labs.errors import LabError
 from labs.problems.linear_quadratic import LqrPolicy, LqrProblem
 
-TOLERANCE, MOST = 1e-9, 400
+TOLERANCE, MAX_LAPS = 1e-9, 400
 """Laps end when P_0 and p_0 change by less than this share; how many."""
 
 
 @dataclass(frozen=True, eq=False)
-class Periodic:
+class PeriodicRegulator:
     """The policy for ever, over one lap."""
 
     problem: LqrProblem
@@ -50,33 +50,35 @@ class Periodic:
         return float(self.policy.constants[0] - self.policy.constants[-1])
 
 
-def periodic(lap: LqrProblem) -> Periodic:
+def solve_periodic(lap: LqrProblem) -> PeriodicRegulator:
     """The policy for a lap that repeats for ever; its terminal terms do not matter. Raises
     LabError where it does not settle, or settles on one that does not stabilise."""
     p, linear, radius = lap.terms["q"][0], np.zeros(lap.n), np.inf
-    for laps in range(1, MOST + 1):
+    for laps in range(1, MAX_LAPS + 1):
         policy = solve(replace(lap, q_final=p, q_final_linear=linear, constant_final=0.0))
         residual = max(
             relative_change(policy.values[0], p),
             _linear_change(policy.linear[0], linear, policy.values[0]),
         )
         if residual < TOLERANCE:
-            radius = _radius(lap, policy)
+            radius = _lap_spectral_radius(lap, policy)
             if radius < 1.0:
-                return Periodic(lap, policy, laps, residual, radius)
+                return PeriodicRegulator(lap, policy, laps, residual, radius)
         p, linear = policy.values[0], policy.linear[0]
     if residual < TOLERANCE:
         raise LabError(
-            f"after {MOST} laps the regulator rests, but what it regulates grows by a factor of "
-            f"{radius:.6g} a lap: put a weight on what does not decay"
+            f"after {MAX_LAPS} laps the regulator rests, but what it regulates grows by a factor "
+            f"of {radius:.6g} a lap: put a weight on what does not decay"
         )
     raise LabError(
-        f"after {MOST} laps the regulator still changes by {residual:.1e} of its size a lap: raise "
-        "the weight of what moves slowly, or give B a grip on it"
+        f"after {MAX_LAPS} laps the regulator still changes by {residual:.1e} of its size a lap: "
+        "raise the weight of what moves slowly, or give B a grip on it"
     )
 
 
-def preview(known: Periodic, start: int, steps: int) -> tuple[LqrProblem, LqrPolicy]:
+def preview_problem(
+    known: PeriodicRegulator, start: int, steps: int
+) -> tuple[LqrProblem, LqrPolicy]:
     """The problem of the next `steps` from step `start` of the lap, which costs x' P x at its
     end, and its policy. With `steps` = 0 nothing is known of c, q and s: a problem of one step
     without them, k = 0."""
@@ -84,13 +86,13 @@ def preview(known: Periodic, start: int, steps: int) -> tuple[LqrProblem, LqrPol
     m = lap.horizon
     index = (start + np.arange(horizon)) % m
     shown = 1.0 if steps > 0 else 0.0
-    c, q_linear, s_linear = (shown * term[index % len(term)] for term in _linear(lap))
+    c, q_linear, s_linear = (shown * term[index % len(term)] for term in _inhomogeneous_terms(lap))
     window = LqrProblem(
         horizon=horizon,
-        a=_seen(lap.a, index),
-        b=_seen(lap.b, index),
-        q=_seen(lap.q, index),
-        r=_seen(lap.r, index),
+        a=_index_term(lap.a, index),
+        b=_index_term(lap.b, index),
+        q=_index_term(lap.q, index),
+        r=_index_term(lap.r, index),
         q_final=known.policy.values[(start + horizon) % m],
         c=c,
         q_linear=q_linear,
@@ -99,12 +101,12 @@ def preview(known: Periodic, start: int, steps: int) -> tuple[LqrProblem, LqrPol
     return window, solve(window)
 
 
-def _linear(problem: LqrProblem) -> tuple[np.ndarray, ...]:
+def _inhomogeneous_terms(problem: LqrProblem) -> tuple[np.ndarray, ...]:
     """The terms that make a problem inhomogeneous."""
     return tuple(problem.terms[name] for name in ("c", "q_linear", "s_linear"))
 
 
-def _seen(term: np.ndarray, index: np.ndarray) -> np.ndarray:
+def _index_term(term: np.ndarray, index: np.ndarray) -> np.ndarray:
     """Of a term that may be one for all steps."""
     return term[index] if term.ndim == 3 else term
 
@@ -119,7 +121,7 @@ def _linear_change(new: np.ndarray, old: np.ndarray, p: np.ndarray) -> float:
     return change / largest if largest > 0.0 else change
 
 
-def _radius(lap: LqrProblem, policy: LqrPolicy) -> float:
+def _lap_spectral_radius(lap: LqrProblem, policy: LqrPolicy) -> float:
     """The spectral radius of a lap under the policy."""
     a, b, turn = lap.terms["a"], lap.terms["b"], np.eye(lap.n)
     for t, gain in enumerate(policy.gains):

@@ -44,7 +44,7 @@ def iterate(mdp: FiniteMDP, V: np.ndarray, policy: np.ndarray, tolerance: float)
     return until_done(lambda at: step(mdp, at, tolerance), init(V, policy))
 
 
-def exact(mdp: FiniteMDP, policy: np.ndarray) -> np.ndarray:
+def exact_values(mdp: FiniteMDP, policy: np.ndarray) -> np.ndarray:
     """V^pi (X,). A random policy or random dynamics take a dense (X, X) matrix: for small MDPs."""
     if policy.ndim == 1 and mdp.successor is not None:
         V = np.empty(mdp.X)

@@ -25,7 +25,7 @@ from labs.algorithms.bellman import (
     policy_backup,
     until_done,
 )
-from labs.algorithms.policy_evaluation import exact
+from labs.algorithms.policy_evaluation import exact_values
 from labs.errors import LabError
 from labs.problems.finite_mdp import FiniteMDP
 
@@ -72,14 +72,14 @@ def optimum(mdp: FiniteMDP, policy: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     from `policy`, (X,) or (X, U). With gamma = 1 a random one gives way to one that is sure to
     end, and V* is infinite from where none is, or where costs have no least sum."""
     if policy.ndim == 2 and mdp.gamma == 1.0:
-        policy = _sure_to_end(mdp)
-    V = exact(mdp, policy)
+        policy = _proper_policy(mdp)
+    V = exact_values(mdp, policy)
     for count in range(MAX_IMPROVEMENTS):
         with np.errstate(invalid="ignore"):  # infinite values that stay so do not change
             _, better, _ = optimal_backup(mdp, V, policy)
         if policy.ndim == 1 and (better == policy).all():
             return V, policy, count
-        before, policy, V = V, better, exact(mdp, better)
+        before, policy, V = V, better, exact_values(mdp, better)
         if (np.isfinite(before) & ~np.isfinite(V)).any():  # cheaper and cheaper, round and round
             return V, policy, count + 1
     raise LabError(
@@ -87,15 +87,15 @@ def optimum(mdp: FiniteMDP, policy: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     )
 
 
-def _sure_to_end(mdp: FiniteMDP) -> np.ndarray:
+def _proper_policy(mdp: FiniteMDP) -> np.ndarray:
     """(X,): a policy that ends with probability 1 from wherever one can: by controls that lead
     nowhere else, the shortest way."""
     policy, sure = np.zeros(mdp.X, np.int64), np.ones(mdp.X, bool)
     while True:
-        stays = mdp.expect((~sure).astype(float)) == 0.0
+        stays = mdp.expected_value((~sure).astype(float)) == 0.0
         found, fresh = mdp.terminal, mdp.terminal
         while fresh.any():
-            leads = stays & (mdp.expect(found.astype(float)) > 0.0)
+            leads = stays & (mdp.expected_value(found.astype(float)) > 0.0)
             fresh = leads.any(axis=1) & ~found
             policy[fresh] = leads[fresh].argmax(axis=1)
             found = found | fresh

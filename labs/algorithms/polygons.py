@@ -13,47 +13,47 @@ from labs.errors import LabError
 from labs.problems.polyhedron import Polyhedron, box
 
 ROUNDING = 1e-12
-FAR = 1e6
+UNBOUNDED_FACTOR = 1e6
 """A vertex farther than half this many times the farthest row's line counts as infinitely far."""
 
 
-class Unbounded(LabError):
+class UnboundedError(LabError):
     """A polyhedron that has no polygon."""
 
 
-def hull(points: np.ndarray) -> np.ndarray:
+def convex_hull(points: np.ndarray) -> np.ndarray:
     """The least polygon around points (k, 2)."""
-    return np.asarray(_hull(_array(points)))
+    return np.asarray(_hull(_as_float_array(points)))
 
 
 def vertices(polyhedron: Polyhedron) -> np.ndarray:
     """The polygon {x : H x <= h}. Raises Unbounded where it is, LabError outside the plane."""
     if polyhedron.n != 2:
         raise LabError(f"a polygon lies in the plane, not in R^{polyhedron.n}")
-    polygon, bounded = _vertices(_array(polyhedron.H), _array(polyhedron.h))
+    polygon, bounded = _vertices(_as_float_array(polyhedron.H), _as_float_array(polyhedron.h))
     if not bounded:
-        raise Unbounded("the set reaches to infinity: add the limits that bound it")
+        raise UnboundedError("the set reaches to infinity: add the limits that bound it")
     return np.asarray(polygon)
 
 
 def clip(polygon: np.ndarray, polyhedron: Polyhedron) -> np.ndarray:
     """What of the polygon lies in the polyhedron, which may be unbounded."""
-    H, h = _unit_rows(_array(polyhedron.H), _array(polyhedron.h))
-    return np.asarray(_clip(_array(polygon), H, h))
+    H, h = _normalize_rows(_as_float_array(polyhedron.H), _as_float_array(polyhedron.h))
+    return np.asarray(_clip(_as_float_array(polygon), H, h))
 
 
-def from_vertices(polygon: np.ndarray) -> Polyhedron:
+def polyhedron_from_vertices(polygon: np.ndarray) -> Polyhedron:
     """The polygon by its edges: rows of length 1. A point or segment takes four rows."""
     if len(polygon) == 0:
         return Polyhedron(np.zeros((1, 2)), np.array([-1.0]))
     if len(polygon) == 1:
         return box(polygon[0], polygon[0])
-    return Polyhedron(*_edges(_array(polygon)))
+    return Polyhedron(*_edges(_as_float_array(polygon)))
 
 
 def minkowski_sum(polygon: np.ndarray, other: np.ndarray) -> np.ndarray:
     """{v + w}: of all v in one and w in the other."""
-    return hull((polygon[:, None] + other[None]).reshape(-1, 2))
+    return convex_hull((polygon[:, None] + other[None]).reshape(-1, 2))
 
 
 def area(polygon: np.ndarray) -> float:
@@ -70,20 +70,22 @@ def support_of_points(points: np.ndarray, directions: np.ndarray) -> np.ndarray:
     return np.asarray((directions @ points.T).max(axis=1, initial=-np.inf))
 
 
-def with_unit_rows(polyhedron: Polyhedron) -> Polyhedron:
+def normalize_rows(polyhedron: Polyhedron) -> Polyhedron:
     """The same set by rows of length 1, so that h is a distance, in any dimension. A row that is
     zero beside the others, as differences and products leave them, goes; where it says
     0 <= -1, it stays alone and the set is empty."""
-    return Polyhedron(*_unit_rows(_array(polyhedron.H), _array(polyhedron.h)))
+    return Polyhedron(
+        *_normalize_rows(_as_float_array(polyhedron.H), _as_float_array(polyhedron.h))
+    )
 
 
-def _array(numbers: np.ndarray) -> np.ndarray:
+def _as_float_array(numbers: np.ndarray) -> np.ndarray:
     """As compiled functions take them: of one type and layout."""
     return np.ascontiguousarray(numbers, float)
 
 
 @compiled
-def _unit_rows(H: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _normalize_rows(H: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     k, n = H.shape
     length = np.zeros(k)
     longest, largest = 0.0, 0.0
@@ -106,12 +108,12 @@ def _unit_rows(H: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 @compiled
 def _vertices(H: np.ndarray, h: np.ndarray) -> tuple[np.ndarray, bool]:
     """The polygon, and whether it is one."""
-    H, h = _unit_rows(H, h)
+    H, h = _normalize_rows(H, h)
     size = 0.0
     for i in range(len(h)):
         size = max(size, abs(h[i]))
     size = size if size > 0.0 else 1.0
-    far = FAR * size
+    far = UNBOUNDED_FACTOR * size
     around = _clip(_rectangle(-far, -far, far, far), H, h)
     if len(around) == 0:
         return around, True
@@ -149,7 +151,7 @@ def _edges(polygon: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 @compiled
-def _rounding(points: np.ndarray) -> float:
+def _rounding_tolerance(points: np.ndarray) -> float:
     largest = 0.0
     for i in range(len(points)):
         largest = max(largest, abs(points[i, 0]), abs(points[i, 1]))
@@ -157,7 +159,7 @@ def _rounding(points: np.ndarray) -> float:
 
 
 @compiled
-def _sorted(points: np.ndarray) -> np.ndarray:
+def _sort_points(points: np.ndarray) -> np.ndarray:
     """By x, then y (Shell, 1959): NumPy's own sort takes seconds to compile."""
     points, gap = points.copy(), len(points)
     while gap > 1:
@@ -176,8 +178,8 @@ def _sorted(points: np.ndarray) -> np.ndarray:
 def _hull(points: np.ndarray) -> np.ndarray:
     """Andrew's monotone chain over the points sorted by x, then y. Left out is what lies within
     rounding of the line between its neighbours."""
-    k, tolerance = len(points), _rounding(points)
-    points = _sorted(points)
+    k, tolerance = len(points), _rounding_tolerance(points)
+    points = _sort_points(points)
     chain = np.empty((2 * k + 2, 2))
     size, floor = 0, 1
     for turn in range(2):
@@ -205,7 +207,7 @@ def _hull(points: np.ndarray) -> np.ndarray:
 @compiled
 def _clip(polygon: np.ndarray, H: np.ndarray, h: np.ndarray) -> np.ndarray:
     """Sutherland and Hodgman's clipping (1974), by one half-plane after the other."""
-    most, tolerance = len(polygon) + 2 * len(H), _rounding(polygon)
+    most, tolerance = len(polygon) + 2 * len(H), _rounding_tolerance(polygon)
     now, new = np.empty((most, 2)), np.empty((most, 2))
     size = len(polygon)
     now[:size] = polygon

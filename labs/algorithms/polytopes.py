@@ -9,11 +9,11 @@ import numpy as np
 from scipy.optimize import linprog
 
 from labs.algorithms.polygons import (
-    Unbounded,
-    from_vertices,
+    UnboundedError,
+    normalize_rows,
+    polyhedron_from_vertices,
     support_of_points,
     vertices,
-    with_unit_rows,
 )
 from labs.errors import LabError
 from labs.problems.polyhedron import Polyhedron
@@ -26,12 +26,12 @@ def support(polyhedron: Polyhedron, directions: np.ndarray) -> np.ndarray:
     """max of d'x over the set, in each of directions (k, n): (k,); inf where it is unbounded
     there, -inf everywhere where it is empty. In the plane by vertices, where there are any."""
     if polyhedron.n == 2:
-        with contextlib.suppress(Unbounded):
+        with contextlib.suppress(UnboundedError):
             return support_of_points(vertices(polyhedron), directions)
-    return support_by_programmes(polyhedron, directions)
+    return support_by_linear_programs(polyhedron, directions)
 
 
-def support_by_programmes(polyhedron: Polyhedron, directions: np.ndarray) -> np.ndarray:
+def support_by_linear_programs(polyhedron: Polyhedron, directions: np.ndarray) -> np.ndarray:
     """The same by one linear programme for each direction."""
     if len(polyhedron.h) == 0:
         return np.where(np.any(directions, axis=1), np.inf, 0.0)
@@ -62,7 +62,7 @@ def is_bounded(polyhedron: Polyhedron) -> bool:
 
 def includes(outer: Polyhedron, inner: Polyhedron, tolerance: float = TOLERANCE) -> bool:
     """Whether all of `inner` lies in `outer`, to within a distance of `tolerance`."""
-    unit = with_unit_rows(outer)
+    unit = normalize_rows(outer)
     return bool((support(inner, unit.H) <= unit.h + tolerance).all())
 
 
@@ -72,10 +72,10 @@ def pontryagin_difference(polyhedron: Polyhedron, points: np.ndarray) -> Polyhed
     return Polyhedron(polyhedron.H, polyhedron.h - support_of_points(points, polyhedron.H))
 
 
-def without_redundant_rows(polyhedron: Polyhedron, tolerance: float = TOLERANCE) -> Polyhedron:
+def remove_redundant_rows(polyhedron: Polyhedron, tolerance: float = TOLERANCE) -> Polyhedron:
     """The same set by rows of length 1, none of which the others imply. One linear programme a
     row. The empty set becomes 0 <= -1."""
-    unit = with_unit_rows(polyhedron)
+    unit = normalize_rows(polyhedron)
     if is_empty(unit):
         return Polyhedron(np.zeros((1, unit.n)), np.array([-1.0]))
     kept = list(range(len(unit.h)))
@@ -88,14 +88,14 @@ def without_redundant_rows(polyhedron: Polyhedron, tolerance: float = TOLERANCE)
     return Polyhedron(unit.H[kept], unit.h[kept])
 
 
-def _without_redundant_rows(polyhedron: Polyhedron) -> Polyhedron:
+def _remove_redundant_rows(polyhedron: Polyhedron) -> Polyhedron:
     """Likewise, in the plane by its corners."""
     if polyhedron.n == 2:
         try:
-            return from_vertices(vertices(polyhedron))
-        except Unbounded:
+            return polyhedron_from_vertices(vertices(polyhedron))
+        except UnboundedError:
             pass
-    return without_redundant_rows(polyhedron)
+    return remove_redundant_rows(polyhedron)
 
 
 def project(polyhedron: Polyhedron, n: int) -> Polyhedron:
@@ -112,6 +112,6 @@ def project(polyhedron: Polyhedron, n: int) -> Polyhedron:
         rows = (H[above][:, None] + H[below][None]).reshape(-1, last + 1)
         ends = (h[above][:, None] + h[below][None]).ravel()
         left = Polyhedron(np.vstack([H[zero], rows])[:, :last], np.concatenate([h[zero], ends]))
-        left = _without_redundant_rows(left)
+        left = _remove_redundant_rows(left)
         H, h = left.H, left.h
     return Polyhedron(H, h)

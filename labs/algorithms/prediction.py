@@ -25,9 +25,9 @@ from labs.problems.prediction import (
     sample_episode,
     weighted_error,
 )
-from labs.random_numbers import seeded
+from labs.random_numbers import random_states
 
-FIRST_VISIT, EVERY_VISIT, TD0, N_STEP, LAMBDA_RETURN, TRACES, TRUE_ONLINE = range(7)
+FIRST_VISIT, EVERY_VISIT, TD0, N_STEP, LAMBDA_RETURN, ELIGIBILITY_TRACES, TRUE_ONLINE = range(7)
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,17 +44,19 @@ class Predictors:
     """(S, k) weighted error after each episode of the last step; infinite once diverged."""
     lengths: np.ndarray
     """(S, k) int64: its number of steps."""
-    sound: np.ndarray
+    bounded: np.ndarray
     """(S,) bool: False once an estimate has left the rule's limit; the learner then stands still,
     with the values from before that episode."""
 
 
-def on_policy(
+def on_policy_task(
     mdp: FiniteMDP, policy: np.ndarray, starts: Sequence[int], horizon: int
 ) -> PredictionTask:
     """Prediction of a policy (X,) or (X, U) while it is followed; the truth by policy evaluation.
     Raises LabError where it has no finite value."""
-    return prediction_task(mdp, policy, policy_evaluation.exact(mdp, policy), starts, horizon)
+    return prediction_task(
+        mdp, policy, policy_evaluation.exact_values(mdp, policy), starts, horizon
+    )
 
 
 def init(task: PredictionTask, seeds: int, rng: np.random.Generator, v0: float = 0.0) -> Predictors:
@@ -63,10 +65,10 @@ def init(task: PredictionTask, seeds: int, rng: np.random.Generator, v0: float =
     return Predictors(
         V=np.tile(np.where(terminal, 0.0, v0), (seeds, 1)),
         visits=np.zeros((seeds, len(terminal)), np.int32),
-        random=seeded(rng, seeds),
+        random=random_states(rng, seeds),
         errors=np.zeros((seeds, 0)),
         lengths=np.zeros((seeds, 0), np.int64),
-        sound=np.ones(seeds, bool),
+        bounded=np.ones(seeds, bool),
     )
 
 
@@ -78,7 +80,7 @@ def step(
     V, visits, random = learners.V.copy(), learners.visits.copy(), learners.random.copy()
     errors = np.zeros((len(V), episodes))
     lengths = np.zeros((len(V), episodes), np.int64)
-    sound = learners.sound.copy()
+    sound = learners.bounded.copy()
     _learn(task, rule, method, V, visits, random, errors, lengths, sound)
     return replace(
         learners,
@@ -87,7 +89,7 @@ def step(
         random=random,
         errors=errors,
         lengths=lengths,
-        sound=sound,
+        bounded=sound,
     )
 
 
@@ -124,18 +126,18 @@ def _learn(
                 n_step(gamma, episode, T, rule, V, N)
             elif method == LAMBDA_RETURN:
                 lambda_return(gamma, episode, T, rule, V, N)
-            elif method == TRACES:
+            elif method == ELIGIBILITY_TRACES:
                 eligibility_traces(gamma, episode, T, rule, V, N)
             else:
                 true_online(gamma, episode, T, rule, V, N)
             lengths[s, k] = T
-            if not _within(V, rule.limit):
+            if not _within_limit(V, rule.limit):
                 V[:], sound[s] = before, False
             errors[s, k] = weighted_error(task, V) if sound[s] else np.inf
 
 
 @compiled
-def _within(V: np.ndarray, limit: float) -> bool:
+def _within_limit(V: np.ndarray, limit: float) -> bool:
     worst = 0.0
     for value in V:
         worst = max(worst, abs(value)) if value == value else np.inf

@@ -12,7 +12,7 @@ from labs.problems.episodes import (
     UpdateRule,
     initial_state,
     min_q,
-    record,
+    record_step,
     step_size,
     transition,
 )
@@ -35,7 +35,7 @@ def q_learning(
                 target += task.gamma * min_q(q, next_x)
             visits[x, u] += 1
             q[x, u] += step_size(rule, visits[x, u]) * (target - q[x, u])
-            discount = record(task, learner, k, x, u, discount)
+            discount = record_step(task, learner, k, x, u, discount)
             if not abs(q[x, u]) <= rule.limit:
                 return False
             x = next_x

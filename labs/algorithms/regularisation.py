@@ -10,7 +10,7 @@ import numpy as np
 
 from labs.problems.optimal_control import Expansion
 
-SMALLEST = 1e-7
+MIN_RELATIVE_MU = 1e-7
 """Below this part of the size of Q_uu mu is zero."""
 
 
@@ -21,11 +21,11 @@ class Regularisation(NamedTuple):
     smallest: float
     limit: float
 
-    def grown(self, mu: float) -> float:
+    def increase(self, mu: float) -> float:
         """The next larger one."""
         return max(mu * self.factor, self.smallest)
 
-    def shrunk(self, mu: float) -> float:
+    def decrease(self, mu: float) -> float:
         """The next smaller one."""
         return mu / self.factor if mu / self.factor >= self.smallest else 0.0
 
@@ -35,4 +35,4 @@ def regularisation(model: Expansion, factor: float, limit: float) -> Regularisat
     l_uu + f_u' l_xx f_u, which is what Q_uu is one step before an end."""
     ahead = np.einsum("tki,tkl,tli->ti", model.B, model.cost.l_xx[1:], model.B)
     size = float(np.abs(np.einsum("tii->ti", model.cost.l_uu) + ahead).max())
-    return Regularisation(factor, SMALLEST * size, limit * size)
+    return Regularisation(factor, MIN_RELATIVE_MU * size, limit * size)

@@ -8,7 +8,7 @@ import numpy as np
 from labs.compiled import compiled
 
 
-class Replay(NamedTuple):
+class ReplayBuffer(NamedTuple):
     """The last transitions, the newest over the oldest; arrays change in place."""
 
     observations: np.ndarray
@@ -26,7 +26,7 @@ class Replay(NamedTuple):
 
 
 class Minibatch(NamedTuple):
-    """Some of them, named as in `Replay`."""
+    """Some of them, named as in `ReplayBuffer`."""
 
     observations: np.ndarray
     controls: np.ndarray
@@ -35,10 +35,10 @@ class Minibatch(NamedTuple):
     ends: np.ndarray
 
 
-def empty(capacity: int, observation_size: int) -> Replay:
+def empty_buffer(capacity: int, observation_size: int) -> ReplayBuffer:
     """Room for so many."""
     shape = (capacity, observation_size)
-    return Replay(
+    return ReplayBuffer(
         np.zeros(shape, np.float32),
         np.zeros(capacity, np.int32),
         np.zeros(capacity, np.float32),
@@ -49,7 +49,7 @@ def empty(capacity: int, observation_size: int) -> Replay:
 
 
 @compiled
-def store(replay: Replay, new: Minibatch) -> None:
+def store(replay: ReplayBuffer, new: Minibatch) -> None:
     """Adds transitions."""
     capacity = len(replay.costs)
     for i in range(len(new.costs)):

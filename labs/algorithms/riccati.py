@@ -18,12 +18,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
-from labs.algorithms.riccati_recursion import backward, iterate
+from labs.algorithms.riccati_recursion import backward_pass, iterate
 from labs.algorithms.stabilizability import require_detectable, require_stabilizable
 from labs.errors import LabError
 from labs.problems.linear_quadratic import LqrPolicy, LqrProblem
 
-SOLVED = 1e-6
+RICCATI_TOLERANCE = 1e-6
 """What SciPy's P may change in one more step, as a share of it, to count as a solution."""
 
 
@@ -37,7 +37,7 @@ def solve(problem: LqrProblem) -> LqrPolicy:
     values[steps] = terms["q_final"][0]
     # Compiled for one layout of memory: another one would be compiled while somebody waits.
     a, b, q, r, s = (np.ascontiguousarray(terms[name]) for name in "abqrs")
-    failed = backward(a, b, q, r, s, values, gains)
+    failed = backward_pass(a, b, q, r, s, values, gains)
     if failed >= 0:
         raise LabError(
             f"P grows beyond all numbers {steps - failed} steps before the end of N = {steps}: "
@@ -87,13 +87,13 @@ def steady_state(
     next to nothing, P rests for long near zero. A (n, n), B (n, m), Q (n, n), R (m, m). Raises
     LabError where there is no steady state: (A, B) is not stabilizable, or Q does not see a mode
     that does not decay."""
-    terms = _lasting(a, b, q, r)
+    terms = _steady_state_terms(a, b, q, r)
     values, gain = np.stack([q, q]).astype(float), np.zeros(b.T.shape)
     iterations, more, residual, radius = 0, most, np.inf, np.inf
     while more > 0:
         count, residual = iterate(*terms, values, gain, tolerance, more)
         iterations += count
-        radius = _radius(a + b @ gain)
+        radius = _spectral_radius(a + b @ gain)
         if radius < 1.0 or not np.isfinite(residual):
             break
         # It rests and does not stabilise: onwards, blindly, for as many steps again.
@@ -114,17 +114,17 @@ def steady_state(
             "size a step: allow more of them, or make the loop faster by raising Q or lowering R."
         )
     elif not radius < 1.0:
-        trouble = _unstable(radius)
+        trouble = _unstable_message(radius)
     return SteadyState(gain, values[0].copy(), iterations, residual, radius, trouble)
 
 
-def steady_state_directly(
+def steady_state_by_scipy(
     a: np.ndarray, b: np.ndarray, q: np.ndarray, r: np.ndarray
 ) -> SteadyState:
     """The same by SciPy, from the eigenvectors of the extended symplectic pencil. K is that of one
     more step of the recursion. Raises LabError as `steady_state` does, and where SciPy finds no
     solution."""
-    terms = _lasting(a, b, q, r)
+    terms = _steady_state_terms(a, b, q, r)
     try:
         p = solve_discrete_are(a, b, q, r)
     except (np.linalg.LinAlgError, ValueError) as error:
@@ -134,15 +134,15 @@ def steady_state_directly(
         ) from None
     values, gain = np.stack([p, p]), np.zeros(b.T.shape)
     residual = iterate(*terms, values, gain, 0.0, 1)[1]
-    radius, trouble = _radius(a + b @ gain), ""
-    if not residual <= SOLVED:
+    radius, trouble = _spectral_radius(a + b @ gain), ""
+    if not residual <= RICCATI_TOLERANCE:
         trouble = (
             f"SciPy's P does not solve the Riccati equation: one more step of the recursion "
             f"changes it by {residual:.1e} of its size. Iterate the recursion, or bring the "
             "weights closer together."
         )
     elif not radius < 1.0:
-        trouble = _unstable(radius)
+        trouble = _unstable_message(radius)
     return SteadyState(gain, p, 0, residual, radius, trouble)
 
 
@@ -153,19 +153,19 @@ def prepare() -> None:
     steady_state(one, one, one, one)
 
 
-def _radius(loop: np.ndarray) -> float:
+def _spectral_radius(loop: np.ndarray) -> float:
     """The spectral radius."""
     return float(np.abs(np.linalg.eigvals(loop)).max()) if np.isfinite(loop).all() else np.inf
 
 
-def _unstable(radius: float) -> str:
+def _unstable_message(radius: float) -> str:
     return (
         "P solves the Riccati equation, but its gain does not stabilise: A + B K has an "
         f"eigenvalue of magnitude {radius:.9g}. Raise the weight of what does not decay."
     )
 
 
-def _lasting(
+def _steady_state_terms(
     a: np.ndarray, b: np.ndarray, q: np.ndarray, r: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """A, B, Q, R and S = 0 as stacks of one, checked for a steady state."""

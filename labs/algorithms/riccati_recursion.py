@@ -10,7 +10,7 @@ from labs.compiled import compiled
 
 
 @compiled
-def backward(
+def backward_pass(
     a: np.ndarray,
     b: np.ndarray,
     q: np.ndarray,

@@ -24,16 +24,16 @@ import numpy as np
 
 from labs.algorithms import polytopes
 from labs.algorithms.polygons import (
-    Unbounded,
-    from_vertices,
+    UnboundedError,
     minkowski_sum,
+    polyhedron_from_vertices,
     support_of_points,
     vertices,
 )
 from labs.errors import LabError
 from labs.problems.polyhedron import Polyhedron
 
-MOST_TERMS = 1000
+MAX_TERMS = 1000
 """Of the sum; slower contractions are refused."""
 
 
@@ -72,7 +72,7 @@ class RobustInvariantSet:
 
     def polyhedron(self) -> Polyhedron:
         """S in the plane by its edges. Raises LabError elsewhere."""
-        return from_vertices(self.polygon())
+        return polyhedron_from_vertices(self.polygon())
 
 
 def robust_invariant_set(A: np.ndarray, W: Polyhedron, error: float) -> RobustInvariantSet:
@@ -90,13 +90,13 @@ def robust_invariant_set(A: np.ndarray, W: Polyhedron, error: float) -> RobustIn
         )
     try:
         support = _support_function(W)
-    except Unbounded:
+    except UnboundedError:
         raise LabError("the set of disturbances W must be bounded") from None
     axes = np.vstack([np.eye(n), -np.eye(n)])
     if not np.isfinite(support(axes)).all():
         raise LabError("the set of disturbances W must be bounded")
     extent, power = np.zeros(2 * n), np.eye(n)
-    for s in range(1, MOST_TERMS + 1):
+    for s in range(1, MAX_TERMS + 1):
         extent += support(axes @ power)
         power = A @ power
         alpha = float((support(W.H @ power) / W.h).max())
@@ -104,7 +104,7 @@ def robust_invariant_set(A: np.ndarray, W: Polyhedron, error: float) -> RobustIn
         if alpha * M <= error * (1.0 - alpha):
             return RobustInvariantSet(A, W, s, alpha, alpha * M / (1.0 - alpha))
     raise LabError(
-        f"with a spectral radius of {radius:.4g} it takes more than {MOST_TERMS} terms to come "
+        f"with a spectral radius of {radius:.4g} it takes more than {MAX_TERMS} terms to come "
         f"within {error:.3g} of the minimal set: choose a gain K that contracts faster"
     )
 

@@ -24,13 +24,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from labs.algorithms.butcher_tableau import ROUNDING, Tableau, parse_tableau
+from labs.algorithms.butcher_tableau import SUM_TOLERANCE, Tableau, parse_tableau
 
 NEWTON_STEPS = 25
 NEWTON_TOLERANCE = 1e-12
 """Newton stops when no component of the stage equations is off by more than this, relative to
 1 + the largest |f|."""
-ORDER_TOLERANCE = ROUNDING
+ORDER_TOLERANCE = SUM_TOLERANCE
 """A condition of order counts as met within this."""
 
 

@@ -19,7 +19,7 @@ from labs.problems.episodes import (
     Learner,
     UpdateRule,
     initial_state,
-    record,
+    record_step,
     step_size,
     transition,
 )
@@ -43,7 +43,7 @@ def sarsa(
                 target += task.gamma * q[next_x, next_u]
             visits[x, u] += 1
             q[x, u] += step_size(rule, visits[x, u]) * (target - q[x, u])
-            discount = record(task, learner, k, x, u, discount)
+            discount = record_step(task, learner, k, x, u, discount)
             if not abs(q[x, u]) <= rule.limit:
                 return False
             x, u = next_x, next_u
@@ -68,7 +68,7 @@ def sarsa_n(
         while updated < end:
             if t < end:
                 paid[t % n] = task.cost[x, u]
-                discount = record(task, learner, k, x, u, discount)
+                discount = record_step(task, learner, k, x, u, discount)
                 next_x, next_u = transition(task, x, u, random), 0
                 if task.terminal[next_x]:
                     end = t + 1

@@ -20,7 +20,7 @@ from labs.problems.episodes import (
     Learner,
     UpdateRule,
     initial_state,
-    record,
+    record_step,
     step_size,
     transition,
 )
@@ -68,7 +68,7 @@ def sarsa_lambda(
                     traced[i] = traced[many]
                 else:
                     i += 1
-            discount = record(task, learner, k, x, u, discount)
+            discount = record_step(task, learner, k, x, u, discount)
             x, u = next_x, next_u
         q[:] = learned
         trace[traced[:many]] = 0.0

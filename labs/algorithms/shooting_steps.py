@@ -28,10 +28,10 @@ from labs.problems.continuous_control import ContinuousProblem
 from labs.resumable import Resumable
 
 CostForm = Literal["augmented", "sum"]
-FORMS: tuple[CostForm, ...] = ("augmented", "sum")
+COST_FORMS: tuple[CostForm, ...] = ("augmented", "sum")
 
 
-class Method(NamedTuple):
+class ExplicitMethod(NamedTuple):
     """A Runge-Kutta method each of whose stages uses the one before it alone."""
 
     title: str
@@ -40,15 +40,15 @@ class Method(NamedTuple):
     b: tuple[float, ...]
 
 
-SHOOTING_METHODS: Mapping[str, Method] = {
-    "explicit-euler": Method("Explicit Euler", 1, (), (1.0,)),
-    "midpoint": Method("Midpoint", 2, (0.5,), (0.0, 1.0)),
-    "rk4": Method("Runge-Kutta 4", 4, (0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
+SHOOTING_METHODS: Mapping[str, ExplicitMethod] = {
+    "explicit-euler": ExplicitMethod("Explicit Euler", 1, (), (1.0,)),
+    "midpoint": ExplicitMethod("Midpoint", 2, (0.5,), (0.0, 1.0)),
+    "rk4": ExplicitMethod("Runge-Kutta 4", 4, (0.5, 0.5, 1.0), (1 / 6, 1 / 3, 1 / 3, 1 / 6)),
 }
 """By the names of `labs.algorithms.integrators.INTEGRATORS`."""
 
 
-def method_of(name: str, N: int, M: int) -> Method:
+def shooting_method(name: str, N: int, M: int) -> ExplicitMethod:
     """The one of SHOOTING_METHODS for N pieces of M steps. Raises LabError where there is none."""
     if name not in SHOOTING_METHODS:
         raise LabError(f"no method is named {name!r}; there are {', '.join(SHOOTING_METHODS)}")
@@ -57,9 +57,9 @@ def method_of(name: str, N: int, M: int) -> Method:
     return SHOOTING_METHODS[name]
 
 
-def advance(
+def integrate_step(
     f: Callable[[np.ndarray, np.ndarray], np.ndarray],
-    method: Method,
+    method: ExplicitMethod,
     x: np.ndarray,
     u: np.ndarray,
     h: float,
@@ -98,7 +98,7 @@ class ShootingSteps:
     """K steps of one method through the horizon of a problem."""
 
     problem: ContinuousProblem
-    method: Method
+    method: ExplicitMethod
     K: int
     form: CostForm
 
@@ -109,7 +109,7 @@ class ShootingSteps:
         x = X[0] = self.problem.x0
         f, method, h = self.problem.dynamics.f, self.method, W[:, -1] / self.K
         for X_next, P_j, u, h_j in zip(X[1:], P, W[:, :-1].copy(), h.tolist(), strict=True):
-            x = X_next[:] = advance(f, method, x, u, h_j, P_j)
+            x = X_next[:] = integrate_step(f, method, x, u, h_j, P_j)
         return X, P
 
     def running(self, P: np.ndarray, W: np.ndarray) -> float:

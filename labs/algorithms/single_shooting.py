@@ -27,14 +27,14 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from labs.algorithms.adjoint import adjoint_gradient
-from labs.algorithms.shooting_steps import CostForm, ShootingSteps, StepDerivatives, method_of
+from labs.algorithms.shooting_steps import CostForm, ShootingSteps, StepDerivatives, shooting_method
 from labs.algorithms.state_constraints import StateConstraints
 from labs.problems.continuous_control import ContinuousProblem
 from labs.problems.nonlinear_program import ProgramDerivatives, ProgramValues
 from labs.problems.optimal_control import LARGEST_STATE, diverges_at
 from labs.resumable import Resumable
 
-Differences = Literal["forward", "central"]
+DifferenceScheme = Literal["forward", "central"]
 
 
 class Rollout(NamedTuple):
@@ -64,7 +64,7 @@ class SingleShooting:
         method: str = "rk4",
         form: CostForm = "augmented",
     ) -> None:
-        scheme = method_of(method, N, M)
+        scheme = shooting_method(method, N, M)
         self.problem, self.N, self.M = problem, N, M
         self.nx, self.nu = problem.dynamics.nx, problem.dynamics.nu
         self.free_time = problem.T_limits is not None
@@ -168,7 +168,7 @@ class SingleShooting:
         return self._to_variables(adjoint_gradient(at.A, at.B, l_x, at.L_w))
 
     def gradient_by_differences(
-        self, y: np.ndarray, eps: float, kind: Differences
+        self, y: np.ndarray, eps: float, kind: DifferenceScheme
     ) -> Resumable[np.ndarray]:
         """dJ/dy (n,), from n or 2 n more rollouts, y_k moved by eps (1 + |y_k|)."""
         gradient, J = np.empty(self.n), self.cost(y)
@@ -199,7 +199,7 @@ class SingleShooting:
         S, X = self.sensitivities(at)[self.M :: self.M], self.rollout(y).X[self.M :: self.M]
         g_y = (constraints.jacobians(X) @ S).reshape(-1, self.n)
         c_y = self.end_sensitivities(y, S)
-        return ProgramDerivatives(f_y, full_csc(c_y), csc_with(self._g_pattern, g_y))
+        return ProgramDerivatives(f_y, full_csc(c_y), csc_from_pattern(self._g_pattern, g_y))
 
     def hessian(
         self, y: np.ndarray, lam: np.ndarray, mu: np.ndarray, exact: bool
@@ -286,10 +286,10 @@ class SingleShooting:
 
 def full_csc(matrix: np.ndarray) -> csc_array:
     """The matrix with all its entries, also those that happen to be zero."""
-    return csc_with(np.ones(matrix.shape, bool), matrix)
+    return csc_from_pattern(np.ones(matrix.shape, bool), matrix)
 
 
-def csc_with(pattern: np.ndarray, matrix: np.ndarray) -> csc_array:
+def csc_from_pattern(pattern: np.ndarray, matrix: np.ndarray) -> csc_array:
     """The entries of the matrix where the pattern is true."""
     columns, rows = np.nonzero(pattern.T)
     starts = np.concatenate([[0], np.cumsum(pattern.sum(axis=0))])

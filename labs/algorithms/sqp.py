@@ -22,17 +22,17 @@ from dataclasses import replace
 import numpy as np
 
 from labs.algorithms import sqp_active_set, sqp_bfgs
-from labs.algorithms.sqp_filter import LARGEST_GROWTH, Filter, violation
+from labs.algorithms.sqp_filter import MAX_VIOLATION_GROWTH, Filter, violation
+from labs.algorithms.sqp_iterate import PrimalDualPoint as PrimalDualPoint
 from labs.algorithms.sqp_iterate import SqpIterate as SqpIterate
 from labs.algorithms.sqp_iterate import SqpOptions as SqpOptions
-from labs.algorithms.sqp_iterate import Variables as Variables
 from labs.algorithms.sqp_optimality import optimality, worst_violation
-from labs.algorithms.sqp_step import moved
+from labs.algorithms.sqp_step import take_step
 from labs.errors import LabError
 from labs.problems.nonlinear_program import NonlinearProgram
 from labs.resumable import Resumable, run_to_completion, timed
 
-STALLED = 1e-13
+STALL_TOLERANCE = 1e-13
 """A whole step that changes y by less than this, in its units or parts of it, is none."""
 
 
@@ -50,7 +50,7 @@ def init(program: NonlinearProgram, y: np.ndarray, options: SqpOptions) -> SqpIt
         stopped = f"Infeasible: the lower bound of {name} is above its upper one."
     elif not np.isfinite(values.f):
         stopped = "Failed: the first guess diverges. Start from another."
-    largest = LARGEST_GROWTH * max(1.0, violation(values))
+    largest = MAX_VIOLATION_GROWTH * max(1.0, violation(values))
     multipliers = (np.zeros(len(values.c)), np.zeros(len(values.g)), np.zeros(n))
     infeasible = bool(empty.size)
     return SqpIterate(
@@ -60,10 +60,10 @@ def init(program: NonlinearProgram, y: np.ndarray, options: SqpOptions) -> SqpIt
 
 def step(program: NonlinearProgram, options: SqpOptions, at: SqpIterate) -> SqpIterate:
     """One iteration. What has stopped stays as it is."""
-    return run_to_completion(step_in_pieces(program, options, at))
+    return run_to_completion(resumable_step(program, options, at))
 
 
-def step_in_pieces(
+def resumable_step(
     program: NonlinearProgram, options: SqpOptions, at: SqpIterate
 ) -> Resumable[SqpIterate]:
     """The same, pausing between pieces of some milliseconds."""
@@ -71,19 +71,19 @@ def step_in_pieces(
         return at
     seconds = {"derivatives": 0.0, "QP": 0.0, "line search": 0.0}
     if at.derivatives is None:
-        at = yield from timed(_expanded(program, options, at), seconds, "derivatives")
+        at = yield from timed(_evaluate_derivatives(program, options, at), seconds, "derivatives")
         if at.stopped:
             return replace(at, seconds=seconds)
     before = at
-    at = yield from moved(program, options, at, seconds)
+    at = yield from take_step(program, options, at, seconds)
     at = replace(at, iteration=at.iteration + 1)
     if not at.stopped:
-        at = yield from timed(_expanded(program, options, at), seconds, "derivatives")
-    if at.learnt and at.derivatives and before.derivatives:
+        at = yield from timed(_evaluate_derivatives(program, options, at), seconds, "derivatives")
+    if at.bfgs and at.derivatives and before.derivatives:
         change = at.gradient(at.derivatives) - at.gradient(before.derivatives)
-        at = replace(at, learnt=at.learnt.updated(at.y - before.y, change))
+        at = replace(at, bfgs=at.bfgs.update(at.y - before.y, change))
     if not at.stopped:
-        at = _stopped_short(program, options, before, at)
+        at = _check_termination(program, options, before, at)
     return replace(at, seconds=seconds)
 
 
@@ -98,8 +98,8 @@ def solve(
     return at
 
 
-def restart(
-    program: NonlinearProgram, last: Variables | SqpIterate, options: SqpOptions
+def warm_start(
+    program: NonlinearProgram, last: PrimalDualPoint | SqpIterate, options: SqpOptions
 ) -> SqpIterate:
     """From where another programme's iterate ended, with its multipliers where they fit: for a
     problem that is a little different."""
@@ -114,7 +114,7 @@ def prepare() -> None:
     sqp_active_set.prepare()
 
 
-def _expanded(
+def _evaluate_derivatives(
     program: NonlinearProgram, options: SqpOptions, at: SqpIterate
 ) -> Resumable[SqpIterate]:
     """With derivatives at y, the first Hessian that BFGS learns from, and whether it has
@@ -126,21 +126,21 @@ def _expanded(
     largest = max(at.largest_gradient, float(np.abs(d.f_y).max(initial=0.0)))
     found = optimality(program, at.y, at.values, d, at.lam, at.mu, largest)
     at = replace(at, derivatives=d, optimality=found, nu=found.nu, largest_gradient=largest)
-    if max(found.residual, found.violation) <= options.tolerance and not at.loose:
+    if max(found.residual, found.violation) <= options.tolerance and not at.qp_inexact:
         return replace(at, converged=True, stopped=_convergence_message(at))
-    if options.hessian == "bfgs" and at.learnt is None:
+    if options.hessian == "bfgs" and at.bfgs is None:
         f_yy = yield from program.hessian(at.y, at.lam, at.mu, exact=False)
-        at = replace(at, learnt=sqp_bfgs.first(f_yy))
+        at = replace(at, bfgs=sqp_bfgs.initial_hessian(f_yy))
     return at
 
 
-def _stopped_short(
+def _check_termination(
     program: NonlinearProgram, options: SqpOptions, before: SqpIterate, at: SqpIterate
 ) -> SqpIterate:
     """Stopped here without convergence, if there is a reason."""
     assert at.optimality
     change = float((np.abs(at.y - before.y) / (1.0 + np.abs(at.y))).max(initial=0.0))
-    stalled = at.alpha == 1.0 and change < STALLED and not at.penalty
+    stalled = at.alpha == 1.0 and change < STALL_TOLERANCE and not at.penalty
     if not stalled and at.iteration < options.iterations:
         return at
     where = f"KKT residual {at.optimality.residual:.1e}; {worst_violation(program, at.values)}"

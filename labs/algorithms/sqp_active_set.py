@@ -21,12 +21,12 @@ import numpy as np
 from scipy.linalg.lapack import dgbtrf, dgbtrs
 from scipy.sparse import csc_array, vstack
 
-from labs.algorithms.sqp_qp_solver import NARROW, QpSolution, QuadraticProgram
+from labs.algorithms.sqp_qp_solver import MIN_BAND_RATIO, QpSolution, QuadraticProgram
 from labs.compiled import compiled
 
-ROUNDS, MANY = 4, 30
+MAX_ROUNDS, MAX_CHANGES = 4, 30
 """An active set that needs more of them, or more changes in one, was not nearly known."""
-REFINEMENTS = 4
+MAX_REFINEMENTS = 4
 """Of a solution, with the same factors; one or two are used."""
 
 
@@ -43,7 +43,7 @@ class ActiveSet(NamedTuple):
         return sum(int(np.sum(mine != theirs)) for mine, theirs in zip(self, other, strict=True))
 
 
-def active_set(qp: QuadraticProgram, found: QpSolution) -> ActiveSet:
+def identify_active_set(qp: QuadraticProgram, found: QpSolution) -> ActiveSet:
     """Of an interior point's solution: where a multiplier is larger than the gap it belongs to."""
     assert found.x is not None
     gap = np.where(found.z_bounds > 0.0, qp.upper - found.x, found.x - qp.lower)
@@ -55,15 +55,15 @@ def solve_active(qp: QuadraticProgram, guess: ActiveSet, tolerance: float) -> Qp
     """From a guess of what is active; None where that does not lead to a solution in a few rounds,
     or the programme has no band. `tolerance` is absolute, of all conditions."""
     active = ActiveSet(np.where(qp.lower == qp.upper, 1.0, guess.bounds), guess.inequalities)
-    for _ in range(ROUNDS):
-        found = _held(qp, active, tolerance)
+    for _ in range(MAX_ROUNDS):
+        found = _solve_equalities(qp, active, tolerance)
         if found is None:
             return None
-        after = _revised(qp, active, found, tolerance)
+        after = _update_active_set(qp, active, found, tolerance)
         changes = after.changes(active)
         if not changes:
             return found
-        if changes > MANY:
+        if changes > MAX_CHANGES:
             return None
         active = after
     return None
@@ -71,30 +71,32 @@ def solve_active(qp: QuadraticProgram, guess: ActiveSet, tolerance: float) -> Qp
 
 def prepare() -> None:
     """Compiles what is asked for."""
-    n = 4 * NARROW
+    n = 4 * MIN_BAND_RATIO
     eye, row, none = csc_array(np.eye(n)), csc_array(np.eye(1, n)), csc_array((0, n))
     far, free = np.full(n, np.inf), ActiveSet(np.zeros(n), np.zeros(0, bool))
     qp = QuadraticProgram(eye, np.ones(n), row, np.ones(1), none, np.zeros(0), -far, far)
     solve_active(qp, free, 1e-9)
 
 
-def _held(qp: QuadraticProgram, active: ActiveSet, tolerance: float) -> QpSolution | None:
+def _solve_equalities(
+    qp: QuadraticProgram, active: ActiveSet, tolerance: float
+) -> QpSolution | None:
     """The solution with this held, or None."""
     m, some = len(qp.b), active.inequalities.any()
     B = csc_array(vstack([qp.A, qp.G[active.inequalities]], format="csc")) if some else qp.A
     b = np.concatenate([qp.b, qp.h[active.inequalities]])
     free = active.bounds == 0.0
     x = np.where(active.bounds > 0.0, qp.upper, np.where(free, 0.0, qp.lower))
-    P_parts, B_parts = _parts(qp.P), _parts(B)
-    variables, rows, size, width = _order(P_parts, B_parts, len(b), free)
-    if size < NARROW * width:
+    P_parts, B_parts = _csc_arrays(qp.P), _csc_arrays(B)
+    variables, rows, size, width = _band_ordering(P_parts, B_parts, len(b), free)
+    if size < MIN_BAND_RATIO * width:
         return None
-    band = _band(P_parts, B_parts, variables, rows, size, width)
+    band = _band_matrix(P_parts, B_parts, variables, rows, size, width)
     factors, pivots, singular = dgbtrf(band.T, width, width, overwrite_ab=1)
     if singular:
         return None
     y, step, places = np.zeros(len(b)), np.empty(size), variables[free]
-    for _ in range(REFINEMENTS):
+    for _ in range(MAX_REFINEMENTS):
         pull = -(qp.P @ x + qp.q + B.T @ y)
         step[places] = pull[free]
         step[rows] = b - B @ x
@@ -110,7 +112,7 @@ def _held(qp: QuadraticProgram, active: ActiveSet, tolerance: float) -> QpSoluti
     return None
 
 
-def _revised(
+def _update_active_set(
     qp: QuadraticProgram, active: ActiveSet, found: QpSolution, tolerance: float
 ) -> ActiveSet:
     """Without what is pushed away from, with what is crossed."""
@@ -122,7 +124,7 @@ def _revised(
     return ActiveSet(bounds, (active.inequalities & (found.z >= -tolerance)) | over)
 
 
-class _Parts(NamedTuple):
+class _CscArrays(NamedTuple):
     """Of a sparse matrix, by columns."""
 
     start: np.ndarray
@@ -131,13 +133,15 @@ class _Parts(NamedTuple):
     value: np.ndarray
 
 
-def _parts(of: csc_array) -> _Parts:
-    return _Parts(of.indptr.astype(np.int32), of.indices.astype(np.int32), of.data.astype(float))
+def _csc_arrays(of: csc_array) -> _CscArrays:
+    return _CscArrays(
+        of.indptr.astype(np.int32), of.indices.astype(np.int32), of.data.astype(float)
+    )
 
 
 @compiled
-def _order(
-    P: _Parts, B: _Parts, m: int, free: np.ndarray
+def _band_ordering(
+    P: _CscArrays, B: _CscArrays, m: int, free: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, int, int]:
     """Where each free variable (n,), others at -1, and each row (m,) stands among all of them, how
     many these are, and how far apart two are at most that meet."""
@@ -175,9 +179,9 @@ def _order(
 
 
 @compiled
-def _band(
-    P: _Parts,
-    B: _Parts,
+def _band_matrix(
+    P: _CscArrays,
+    B: _CscArrays,
     variables: np.ndarray,
     rows: np.ndarray,
     size: int,

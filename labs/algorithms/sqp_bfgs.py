@@ -20,12 +20,12 @@ from labs.errors import LabError
 LARGEST_GROUP = 400
 """A dense B of more variables is no longer worth it."""
 DAMPING = 0.2
-FIRST = 1e-3
+INITIAL_DIAGONAL = 1e-3
 """Of the size of the first B, on its diagonal."""
 
 
 @dataclass(frozen=True, eq=False)
-class Learnt:
+class BlockBfgs:
     """B by groups of variables."""
 
     groups: tuple[np.ndarray, ...]
@@ -40,26 +40,27 @@ class Learnt:
         entries = np.concatenate([block.ravel() for block in self.blocks])
         return Assembly((n, n), source, *terms).matrix(entries)
 
-    def updated(self, s: np.ndarray, r: np.ndarray) -> "Learnt":
+    def update(self, s: np.ndarray, r: np.ndarray) -> "BlockBfgs":
         """B+, from the step s (n,) and the change of the gradient r (n,)."""
         pairs = zip(self.blocks, self.groups, strict=True)
-        blocks = tuple(_updated(block, s[group], r[group]) for block, group in pairs)
-        return Learnt(self.groups, blocks)
+        blocks = tuple(_damped_update(block, s[group], r[group]) for block, group in pairs)
+        return BlockBfgs(self.groups, blocks)
 
 
-def first(H: csc_array) -> Learnt:
+def initial_hessian(H: csc_array) -> BlockBfgs:
     """To begin with: H, never indefinite, and a small part of its size on the diagonal. Raises
     LabError where a group is too large."""
-    groups = _groups(H)
+    groups = _variable_groups(H)
     size = max(float(np.abs(H.diagonal()).max(initial=0.0)), 1e-300)
     rows = H.tocsr()
     blocks = [
-        rows[group][:, group].toarray() + FIRST * size * np.eye(len(group)) for group in groups
+        rows[group][:, group].toarray() + INITIAL_DIAGONAL * size * np.eye(len(group))
+        for group in groups
     ]
-    return Learnt(tuple(groups), tuple(blocks))
+    return BlockBfgs(tuple(groups), tuple(blocks))
 
 
-def _groups(pattern: csc_array) -> list[np.ndarray]:
+def _variable_groups(pattern: csc_array) -> list[np.ndarray]:
     """The variables of each, by the pattern of the Hessian; a last one that meets most others, as
     a free final time does, is a group by itself."""
     n = pattern.shape[0]
@@ -82,7 +83,7 @@ def _groups(pattern: csc_array) -> list[np.ndarray]:
     return found
 
 
-def _updated(B: np.ndarray, s: np.ndarray, r: np.ndarray) -> np.ndarray:
+def _damped_update(B: np.ndarray, s: np.ndarray, r: np.ndarray) -> np.ndarray:
     Bs = B @ s
     curvature = float(s @ Bs)
     if not curvature > 1e-300:

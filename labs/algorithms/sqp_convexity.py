@@ -23,13 +23,13 @@ RHO_FACTOR, RHO_LIMIT = 10.0, 1e8
 BISECTIONS, SAFETY = 4, 0.75
 """Of theta; how much of the largest one is used, since there P is singular."""
 DELTA_FACTOR, DELTA_LIMIT = 5.0, 1e8
-LEAST_DELTA = 1e-4
+MIN_DELTA = 1e-4
 """In parts of the size of H, as the limit."""
 MARGIN = 1e-6
 """P stays positive definite with this part of H's size taken from its diagonal."""
 
 
-class Convex(NamedTuple):
+class ConvexModel(NamedTuple):
     """P, and how it came about."""
 
     P: csc_array
@@ -46,19 +46,21 @@ def convexify(
     least_size: float,
     delta: float,
     most: float = 1.0,
-) -> Convex | None:
+) -> ConvexModel | None:
     """With as little change as suffices. `at_bounds` (n,): what rests at a bound; `least_size` is
     that of H where it vanishes, `delta` what was needed last, and `most` the largest theta wanted.
     None where the limit of delta does not suffice."""
-    size = max(_typical(np.abs(H.diagonal())), least_size)
+    size = max(_median_nonzero(np.abs(H.diagonal())), least_size)
     margin = MARGIN * size
     if most == 1.0 and is_positive_definite(H, margin):
-        return Convex(H)
+        return ConvexModel(H)
     n = len(at_bounds)
     square = csc_array(A.T @ A + diags_array(at_bounds.astype(float), format="csc"))
-    like = _typical(square.diagonal())
+    like = _median_nonzero(square.diagonal())
     unit = size / like if like > 0.0 else 0.0
-    one, (h, g, s, identity) = _aligned(H, gauss_newton, square, diags_array(np.ones(n)).tocsc())
+    one, (h, g, s, identity) = _align_patterns(
+        H, gauss_newton, square, diags_array(np.ones(n)).tocsc()
+    )
 
     def raised(theta: float, rho: float, delta: float = 0.0) -> np.ndarray:
         return np.asarray(theta * h + (1.0 - theta) * g + rho * s + delta * identity)
@@ -77,18 +79,18 @@ def convexify(
                 middle = 0.5 * (low + high)
                 low, high = (middle, high) if convex_at(middle) else (low, middle)
         else:
-            delta = max(delta / DELTA_FACTOR, LEAST_DELTA * size)
+            delta = max(delta / DELTA_FACTOR, MIN_DELTA * size)
             while delta <= DELTA_LIMIT * size:
                 data = raised(0.0, unit, delta)
                 if is_convex(data):
-                    return Convex(one.matrix(data), 0.0, unit, delta)
+                    return ConvexModel(one.matrix(data), 0.0, unit, delta)
                 delta *= DELTA_FACTOR
             return None
         theta = SAFETY * low
     rho = unit
     while rho < RHO_LIMIT * unit and not is_convex(raised(theta, rho)):
         rho *= RHO_FACTOR
-    return Convex(one.matrix(raised(theta, rho)), theta, rho)
+    return ConvexModel(one.matrix(raised(theta, rho)), theta, rho)
 
 
 def is_positive_definite(P: csc_array, margin: float) -> bool:
@@ -132,7 +134,7 @@ class _Pattern:
         return bool(last[-1] - margin > last[:-1] @ solved)
 
 
-def _aligned(*matrices: csc_array) -> tuple[_Pattern, list[np.ndarray]]:
+def _align_patterns(*matrices: csc_array) -> tuple[_Pattern, list[np.ndarray]]:
     """A pattern that holds all of them, and the values of each in it."""
     n = matrices[0].shape[0]
     places = []
@@ -150,7 +152,7 @@ def _aligned(*matrices: csc_array) -> tuple[_Pattern, list[np.ndarray]]:
     return _Pattern((union % n).astype(np.int32), indptr.astype(np.int32)), values
 
 
-def _typical(diagonal: np.ndarray) -> float:
+def _median_nonzero(diagonal: np.ndarray) -> float:
     """The median of what is not zero."""
     some = diagonal[diagonal > 1e-12 * diagonal.max(initial=0.0)]
     return float(np.median(some)) if some.size else 0.0

@@ -21,12 +21,12 @@ import numpy as np
 from labs.problems.nonlinear_program import NonlinearProgram, ProgramValues
 from labs.resumable import Resumable
 
-HALVINGS = 20
+MAX_HALVINGS = 20
 """Of alpha, at most."""
-CORRECTIONS = 3
+MAX_CORRECTIONS = 3
 """Second-order ones of a step, at most."""
 ARMIJO = 1e-4
-LARGEST_GROWTH = 1e4
+MAX_VIOLATION_GROWTH = 1e4
 """Of theta beyond what it is at first, or 1."""
 MARGIN = 1e-5
 """What theta must fall by, in parts of theta, or f."""
@@ -47,19 +47,19 @@ class Filter:
     """Most that theta may be at all."""
     pairs: tuple[tuple[float, float], ...] = ()
 
-    def allows(self, theta: float, f: float, rounding: float) -> bool:
+    def accepts(self, theta: float, f: float, rounding: float) -> bool:
         """Whether a point is better than every pair in one of both."""
         return theta <= self.largest and all(
             theta <= (1.0 - MARGIN) * t or f <= v - MARGIN * t + rounding for t, v in self.pairs
         )
 
-    def extended(self, theta: float, f: float) -> "Filter":
+    def with_pair(self, theta: float, f: float) -> "Filter":
         """With one pair more, and without those it makes needless."""
         kept = tuple((t, v) for t, v in self.pairs if t < theta or v < f)
         return Filter(self.largest, (*kept, (theta, f)))
 
 
-class Trial(NamedTuple):
+class AcceptedPoint(NamedTuple):
     """The point that a search accepted."""
 
     y: np.ndarray
@@ -70,15 +70,15 @@ class Trial(NamedTuple):
     """Whether by a second-order correction."""
 
 
-class Search(NamedTuple):
+class LineSearchResult(NamedTuple):
     """Its end: a point, or the reason why there is none."""
 
-    trial: Trial | None
+    trial: AcceptedPoint | None
     diverged: bool = False
     """Whether the programme had no value at any length."""
 
 
-def search(
+def filter_line_search(
     program: NonlinearProgram,
     y: np.ndarray,
     values: ProgramValues,
@@ -86,28 +86,30 @@ def search(
     slope: float,
     filter_: Filter,
     corrected: Callable[[np.ndarray, ProgramValues], np.ndarray | None],
-) -> Resumable[Search]:
+) -> Resumable[LineSearchResult]:
     """Along p from y, f falling by `slope`. `corrected` makes of a step and of the values at its
     end the corrected step, or None."""
     theta, f = violation(values), values.f
     rounding = ROUNDING * (abs(f) + abs(slope))
-    small = 1e-4 * max(1.0, filter_.largest / LARGEST_GROWTH)
+    small = 1e-4 * max(1.0, filter_.largest / MAX_VIOLATION_GROWTH)
     valued = False
 
-    def judged(y_new: np.ndarray, new: ProgramValues, alpha: float, again: bool) -> Trial | None:
+    def judged(
+        y_new: np.ndarray, new: ProgramValues, alpha: float, again: bool
+    ) -> AcceptedPoint | None:
         theta_new = violation(new)
-        if not filter_.allows(theta_new, new.f, rounding):
+        if not filter_.accepts(theta_new, new.f, rounding):
             return None
         steep = slope < 0.0 and alpha * (-slope) ** 2.3 > theta**1.1
         if steep and theta <= small:
             if new.f - f <= ARMIJO * alpha * slope + rounding:
-                return Trial(y_new, new, alpha, filter_, again)
+                return AcceptedPoint(y_new, new, alpha, filter_, again)
             return None
         if theta_new <= (1.0 - MARGIN) * theta or new.f - f <= -MARGIN * theta + rounding:
-            return Trial(y_new, new, alpha, filter_.extended(theta, f), again)
+            return AcceptedPoint(y_new, new, alpha, filter_.with_pair(theta, f), again)
         return None
 
-    for k in range(HALVINGS + 1):
+    for k in range(MAX_HALVINGS + 1):
         alpha = 0.5**k
         y_new = y + alpha * p
         new = program.values(y_new)
@@ -117,10 +119,10 @@ def search(
         valued = True
         trial = judged(y_new, new, alpha, False)
         if trial:
-            return Search(trial)
+            return LineSearchResult(trial)
         if k == 0 and violation(new) >= theta:
             step, at, least = p, new, violation(new)
-            for _ in range(CORRECTIONS):
+            for _ in range(MAX_CORRECTIONS):
                 better = corrected(step, at)
                 if better is None:
                     break
@@ -131,8 +133,8 @@ def search(
                     break
                 trial = judged(y_new, at, 1.0, True)
                 if trial:
-                    return Search(trial)
+                    return LineSearchResult(trial)
                 if violation(at) > 0.99 * least:
                     break
                 least = violation(at)
-    return Search(None, not valued)
+    return LineSearchResult(None, not valued)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from labs.algorithms.sqp_active_set import ActiveSet
-from labs.algorithms.sqp_bfgs import Learnt
+from labs.algorithms.sqp_bfgs import BlockBfgs
 from labs.algorithms.sqp_filter import Filter
 from labs.algorithms.sqp_optimality import Optimality
 from labs.algorithms.sqp_qp_solver import QpSolver
@@ -43,7 +43,7 @@ class SqpOptions:
 
 
 @dataclass(frozen=True, eq=False)
-class Variables:
+class PrimalDualPoint:
     """Of an iterate, with its multipliers: what another solve may begin with."""
 
     y: np.ndarray
@@ -95,13 +95,13 @@ class SqpIterate:
     """Of the wall clock, spent by the last iteration in derivatives, QP and line search."""
     derivatives: ProgramDerivatives | None = None
     """At y."""
-    learnt: Learnt | None = None
+    bfgs: BlockBfgs | None = None
     """BFGS's Hessian."""
     active: ActiveSet | None = None
     """What the last QP's solution pushed against."""
-    settled: bool = False
+    active_set_settled: bool = False
     """Whether that was nearly so in the one before, too."""
-    loose: bool = False
+    qp_inexact: bool = False
     """Whether the last QP was not solved wholly: then it takes another one to converge."""
     solver: QpSolver = field(default_factory=QpSolver)
     """What the QPs are solved with, which remembers their structure."""

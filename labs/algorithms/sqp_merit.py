@@ -7,18 +7,18 @@ import numpy as np
 
 from labs.algorithms.sqp_filter import (
     ARMIJO,
-    HALVINGS,
+    MAX_HALVINGS,
     ROUNDING,
+    AcceptedPoint,
     Filter,
-    Search,
-    Trial,
+    LineSearchResult,
     violation,
 )
 from labs.problems.nonlinear_program import NonlinearProgram, ProgramValues
 from labs.resumable import Resumable
 
 
-def descend(
+def merit_line_search(
     program: NonlinearProgram,
     y: np.ndarray,
     values: ProgramValues,
@@ -27,13 +27,13 @@ def descend(
     gamma: float,
     filter_: Filter,
     corrected: Callable[[np.ndarray, ProgramValues], np.ndarray | None],
-) -> Resumable[Search]:
+) -> Resumable[LineSearchResult]:
     """Along p from y, phi falling by `slope`; the filter is forgotten, but for its largest theta.
     `corrected` as in `sqp_filter.search`."""
     phi = values.f + gamma * violation(values)
     rounding = ROUNDING * abs(phi)
     fresh, valued = Filter(filter_.largest), False
-    for k in range(HALVINGS + 1):
+    for k in range(MAX_HALVINGS + 1):
         alpha = 0.5**k
         ends = [y + alpha * p]
         new = program.values(ends[0])
@@ -42,11 +42,11 @@ def descend(
             continue
         valued = True
         if new.f + gamma * violation(new) - phi <= ARMIJO * alpha * slope + rounding:
-            return Search(Trial(ends[0], new, alpha, fresh))
+            return LineSearchResult(AcceptedPoint(ends[0], new, alpha, fresh))
         better = corrected(p, new) if k == 0 else None
         if better is not None:
             new = program.values(y + better)
             yield
             if new.f + gamma * violation(new) - phi <= ARMIJO * slope + rounding:
-                return Search(Trial(y + better, new, 1.0, fresh, True))
-    return Search(None, not valued)
+                return LineSearchResult(AcceptedPoint(y + better, new, 1.0, fresh, True))
+    return LineSearchResult(None, not valued)

@@ -11,7 +11,7 @@ from scipy.sparse import csc_array
 
 from labs.problems.nonlinear_program import NonlinearProgram, ProgramDerivatives, ProgramValues
 
-MET = 1e-9
+NEGLIGIBLE_VIOLATION = 1e-9
 """A constraint missed by less, in its unit, is not worth a word."""
 
 
@@ -61,7 +61,7 @@ def worst_violation(program: NonlinearProgram, values: ProgramValues) -> str:
     """The constraint that is missed by most, as a part of a sentence."""
     c, g = np.abs(values.c), values.g
     by_c, by_g = float(c.max(initial=0.0)), float(g.max(initial=0.0))
-    if max(by_c, by_g) < MET:
+    if max(by_c, by_g) < NEGLIGIBLE_VIOLATION:
         return "the constraints are met"
     if by_c >= by_g:
         return f"{program.equality_name(int(np.argmax(c)))} is off by {by_c:.2g}"

@@ -13,16 +13,16 @@ import numpy as np
 import piqp
 from scipy.sparse import csc_array, csc_matrix
 
-MOST_ITERATIONS = 100
+MAX_ITERATIONS = 100
 """Of the solver, which otherwise needs 10 to 30: what takes more has gone astray."""
-BALANCINGS = 3
+SCALING_ITERATIONS = 3
 """Of rows and columns, to scale a programme: more take time and save no iteration."""
-GAP = 0.3
+DUALITY_GAP_FACTOR = 0.3
 """Tolerance of the duality gap, in parts of that of the residuals: with a smaller one an SQP needs
 as many iterations, and more of the solver's."""
-REMEMBERED = 4
+MAX_CACHED_STRUCTURES = 4
 """Structures: a step asks for one, its elastic mode for two more."""
-NARROW = 4
+MIN_BAND_RATIO = 4
 """A matrix with a band of less than one in so many variables goes stage by stage."""
 
 
@@ -59,24 +59,24 @@ class QpSolver:
     within the tolerance."""
 
     def __init__(self) -> None:
-        self._known: list[_Structure] = []
+        self._known: list[_StructureSolver] = []
 
     def solve(self, qp: QuadraticProgram, tolerance: float, stages: bool = True) -> QpSolution:
-        """To this tolerance of the residuals, absolute and relative, and GAP of it of the
-        duality gap; by stages, if they are wanted and the order of the variables allows it, and if
-        that fails in general."""
+        """To this tolerance of the residuals, absolute and relative, and DUALITY_GAP_FACTOR of it
+        of the duality gap; by stages, if they are wanted and the order of the variables allows it,
+        and if that fails in general."""
         known = next((s for s in self._known if s.wanted == stages and s.fits(qp)), None)
         if known:
             found = known.solve(qp, tolerance)
             if found.x is not None:
                 return found
             self._known.remove(known)
-        structure = _Structure(qp, stages, stages and is_staged(qp.P))
+        structure = _StructureSolver(qp, stages, stages and has_stage_structure(qp.P))
         found = structure.solve(qp, tolerance)
         if structure.staged and found.x is None and not found.infeasible:
-            structure = _Structure(qp, stages, False)
+            structure = _StructureSolver(qp, stages, False)
             found = structure.solve(qp, tolerance)
-        self._known = [structure, *self._known][:REMEMBERED]
+        self._known = [structure, *self._known][:MAX_CACHED_STRUCTURES]
         return found
 
     def __reduce__(self) -> tuple[type["QpSolver"], tuple[()]]:
@@ -84,7 +84,7 @@ class QpSolver:
         return QpSolver, ()
 
 
-class _Structure:
+class _StructureSolver:
     """Of programmes that differ in numbers alone, with the solver that knows it."""
 
     def __init__(self, qp: QuadraticProgram, wanted: bool, staged: bool) -> None:
@@ -95,9 +95,9 @@ class _Structure:
         self._solver = piqp.SparseSolver()
         settings = self._solver.settings
         settings.kkt_solver = piqp.sparse_multistage if staged else piqp.sparse_ldlt
-        settings.max_iter = MOST_ITERATIONS
+        settings.max_iter = MAX_ITERATIONS
         settings.preconditioner_scale_cost = True
-        settings.preconditioner_iter = BALANCINGS
+        settings.preconditioner_iter = SCALING_ITERATIONS
 
     def fits(self, qp: QuadraticProgram) -> bool:
         """Whether this is another one of them."""
@@ -108,7 +108,7 @@ class _Structure:
         """One of them."""
         settings = self._solver.settings
         settings.eps_abs = settings.eps_rel = tolerance
-        settings.eps_duality_gap_abs = settings.eps_duality_gap_rel = GAP * tolerance
+        settings.eps_duality_gap_abs = settings.eps_duality_gap_rel = DUALITY_GAP_FACTOR * tolerance
         P, A, G = self._matrices
         (self._solver.update if self._begun else self._solver.setup)(
             P.matrix(qp.P),
@@ -149,11 +149,11 @@ class _Nonzeros:
         return self._matrix
 
 
-def is_staged(P: csc_array) -> bool:
+def has_stage_structure(P: csc_array) -> bool:
     """Whether the variables are ordered so that only near ones meet, but for the last."""
     n = P.shape[0]
     filled = np.flatnonzero(np.diff(P.indptr[:-1]))
     last = P.indptr[filled + 1] - 1
     last = np.where((P.indices[last] == n - 1) & (last > P.indptr[filled]), last - 1, last)
     width = int((P.indices[last] - filled)[P.indices[last] < n - 1].max(initial=0))
-    return bool(n > NARROW * width)
+    return bool(n > MIN_BAND_RATIO * width)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import csc_array, diags_array, eye_array, hstack
 
-from labs.algorithms.sqp_active_set import ActiveSet, active_set, solve_active
+from labs.algorithms.sqp_active_set import ActiveSet, identify_active_set, solve_active
 from labs.algorithms.sqp_qp_solver import QpSolver, QuadraticProgram
 
 TOLERANCE = 1e-11
@@ -22,7 +22,7 @@ TOLERANCE = 1e-11
 AT_BOUND = 1e-9
 """A step that ends so near a bound, in its units or parts of it, and pushes against it, ends
 there."""
-LINEAR = 1e-8
+NEGLIGIBLE_CURVATURE = 1e-8
 """Curvature that stands for none."""
 
 
@@ -41,7 +41,7 @@ class Subproblem(NamedTuple):
     """Of the cost: what the solver's tolerances are in parts of."""
 
 
-class Unsolved(NamedTuple):
+class QpFailure(NamedTuple):
     """That the solver found nothing, or nothing finite."""
 
     infeasible: bool
@@ -56,7 +56,7 @@ class SubproblemSolution(NamedTuple):
     mu: np.ndarray
     nu: np.ndarray
     active: ActiveSet
-    loose: bool = False
+    inexact: bool = False
     """Whether it is not as good as it could be."""
     excess: float = 0.0
     """Sum of the slacks: by how much p misses the constraints."""
@@ -64,13 +64,13 @@ class SubproblemSolution(NamedTuple):
 
 def solve_subproblem(
     qp: Subproblem, solver: QpSolver, tolerance: float = TOLERANCE, guess: ActiveSet | None = None
-) -> SubproblemSolution | Unsolved:
+) -> SubproblemSolution | QpFailure:
     """To this tolerance of its residuals, absolute and relative; or wholly, where a guess of what
     is active is nearly right."""
     return _solve(qp, solver, tolerance, guess)
 
 
-def solve_elastic(qp: Subproblem, gamma: float, solver: QpSolver) -> SubproblemSolution | Unsolved:
+def solve_elastic(qp: Subproblem, gamma: float, solver: QpSolver) -> SubproblemSolution | QpFailure:
     """The same in elastic mode."""
     n, m, k = len(qp.q), len(qp.b), len(qp.h)
     slacks = 2 * m + k
@@ -87,7 +87,7 @@ def solve_elastic(qp: Subproblem, gamma: float, solver: QpSolver) -> SubproblemS
         upper=np.concatenate([qp.upper, np.full(slacks, np.inf)]),
     )
     found = _solve(wide, solver, TOLERANCE, None, stages=False)
-    if isinstance(found, Unsolved):
+    if isinstance(found, QpFailure):
         return found
     excess = float(np.maximum(found.p[n:], 0.0).sum())
     return found._replace(p=found.p[:n], nu=found.nu[:n], excess=excess)
@@ -95,12 +95,12 @@ def solve_elastic(qp: Subproblem, gamma: float, solver: QpSolver) -> SubproblemS
 
 def least_violation(qp: Subproblem, largest: np.ndarray, solver: QpSolver) -> float | None:
     """The least sum of slacks that any p has with |p| <= largest (n,)."""
-    small = LINEAR * diags_array(np.ones(len(qp.q)), format="csc")
+    small = NEGLIGIBLE_CURVATURE * diags_array(np.ones(len(qp.q)), format="csc")
     lower, upper = np.maximum(qp.lower, -largest), np.minimum(qp.upper, largest)
     free = np.zeros(len(qp.q))
     linear = qp._replace(P=csc_array(small), q=free, lower=lower, upper=upper, unit=1.0)
     found = solve_elastic(linear, 1.0, solver)
-    return None if isinstance(found, Unsolved) else found.excess
+    return None if isinstance(found, QpFailure) else found.excess
 
 
 def _solve(
@@ -109,22 +109,26 @@ def _solve(
     tolerance: float,
     guess: ActiveSet | None,
     stages: bool = True,
-) -> SubproblemSolution | Unsolved:
+) -> SubproblemSolution | QpFailure:
     P = csc_array((qp.P.data / qp.unit, qp.P.indices, qp.P.indptr), shape=qp.P.shape)
     scaled = QuadraticProgram(P, qp.q / qp.unit, qp.A, qp.b, qp.G, qp.h, qp.lower, qp.upper)
     found = solve_active(scaled, guess, TOLERANCE) if guess else None
     loose = not found and tolerance > TOLERANCE
     found = found or solver.solve(scaled, tolerance, stages)
     if found.x is None:
-        return Unsolved(found.infeasible)
+        return QpFailure(found.infeasible)
     nu = qp.unit * found.z_bounds
-    p, lam, mu = _snapped(qp, found.x, nu), qp.unit * found.y, qp.unit * np.maximum(found.z, 0.0)
+    p, lam, mu = (
+        _snap_to_bounds(qp, found.x, nu),
+        qp.unit * found.y,
+        qp.unit * np.maximum(found.z, 0.0),
+    )
     if not all(np.isfinite(part).all() for part in (p, lam, mu, nu)):
-        return Unsolved(infeasible=False)
-    return SubproblemSolution(p, lam, mu, nu, active_set(scaled, found), loose)
+        return QpFailure(infeasible=False)
+    return SubproblemSolution(p, lam, mu, nu, identify_active_set(scaled, found), loose)
 
 
-def _snapped(qp: Subproblem, p: np.ndarray, nu: np.ndarray) -> np.ndarray:
+def _snap_to_bounds(qp: Subproblem, p: np.ndarray, nu: np.ndarray) -> np.ndarray:
     """p, exactly at the bounds that it pushes against; an interior point is only near them."""
     p = np.clip(p, qp.lower, qp.upper)
     bound = np.where(nu > 0.0, qp.upper, qp.lower)

@@ -23,17 +23,17 @@ NEGLIGIBLE = 1e-7
 as zero; so does the distance of |lambda| to 1, to which double eigenvalues are computed."""
 
 
-def hidden_modes(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def unstabilizable_modes(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """The eigenvalues of A (n, n) with |lambda| >= 1 on which B (n, m) has no grip, (k,)."""
-    unit = _units(a, b)
+    unit = _state_units(a, b)
     near, far = unit > 0.0, unit == 0.0
-    found = [value for value in _eigenvalues(a[np.ix_(far, far)]) if _lasts(value)]
+    found = [value for value in _eigenvalues(a[np.ix_(far, far)]) if _does_not_decay(value)]
     unit = unit[near]
     a, b = a[np.ix_(near, near)] * unit / unit[:, None], b[near] / unit[:, None]
     b /= max(float(np.linalg.norm(b)), np.finfo(float).tiny)
     scale = max(1.0, float(np.abs(a).max(initial=0.0)))
     for value in _eigenvalues(a):
-        if _lasts(value):
+        if _does_not_decay(value):
             pencil = np.hstack([a - value * np.eye(len(a)), b])
             if np.linalg.svd(pencil, compute_uv=False)[-1] <= NEGLIGIBLE * scale:
                 found.append(value)
@@ -42,32 +42,32 @@ def hidden_modes(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def require_stabilizable(a: np.ndarray, b: np.ndarray) -> None:
     """Raises LabError naming an eigenvalue that no control can move."""
-    hidden = hidden_modes(a, b)
+    hidden = unstabilizable_modes(a, b)
     if len(hidden):
         raise LabError(
             f"(A, B) is not stabilizable: no control acts on the mode with eigenvalue "
-            f"{shown(hidden[0])}, which does not decay; give B a part along it"
+            f"{eigenvalue_text(hidden[0])}, which does not decay; give B a part along it"
         )
 
 
 def require_detectable(a: np.ndarray, q: np.ndarray) -> None:
     """Raises LabError naming an eigenvalue whose motion costs nothing. Q (n, n)."""
-    hidden = hidden_modes(a.T, weight_roots(q[None])[0].T)
+    hidden = unstabilizable_modes(a.T, weight_roots(q[None])[0].T)
     if len(hidden):
         raise LabError(
-            f"Q does not see the mode with eigenvalue {shown(hidden[0])}, which does not decay: "
-            "a steady state needs a weight on it"
+            f"Q does not see the mode with eigenvalue {eigenvalue_text(hidden[0])}, which does not "
+            "decay: a steady state needs a weight on it"
         )
 
 
-def shown(eigenvalue: complex) -> str:
+def eigenvalue_text(eigenvalue: complex) -> str:
     """An eigenvalue in few digits, with its magnitude where it is not real."""
     if abs(eigenvalue.imag) <= NEGLIGIBLE:
         return f"{eigenvalue.real:.4g}"
     return f"{eigenvalue:.4g} of magnitude {abs(eigenvalue):.4g}"
 
 
-def _units(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _state_units(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """d (n,), its sum up to k = 2 n."""
     n, a = len(a), np.abs(a)
     spread = a / (2.0 * float(np.abs(np.linalg.eigvals(a)).max()) or 1.0)
@@ -79,7 +79,7 @@ def _units(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return unit
 
 
-def _lasts(eigenvalue: complex) -> bool:
+def _does_not_decay(eigenvalue: complex) -> bool:
     return abs(eigenvalue) >= 1.0 - NEGLIGIBLE
 
 

@@ -23,7 +23,7 @@ from scipy.sparse import csc_matrix
 from labs.algorithms.assembly import Assembly, MatrixTerms, block_terms
 from labs.algorithms.nonlinear_mpc_problem import NonlinearMpcProblem
 
-MOST_ITERATIONS = 60
+MAX_ITERATIONS = 60
 """Of the solver, which otherwise needs 8 to 25."""
 
 
@@ -65,7 +65,7 @@ class StageQp:
     def __init__(self, problem: NonlinearMpcProblem, N: int, tolerance: float = 1e-8) -> None:
         self.problem, self.N, self.tolerance = problem, N, tolerance
         nx, nu, soft = problem.nx, problem.nu, problem.soft
-        self._u, self._x, self._s = _places(N, nx, nu, soft)
+        self._u, self._x, self._s = _variable_indices(N, nx, nu, soft)
         self.n = N * (nu + nx + soft)
         self._scale, self._unit = _scales(problem)
         self._dynamics, final_rows = self._dynamics_pattern()
@@ -79,7 +79,7 @@ class StageQp:
         self._G = csc_matrix(G.matrix(np.ones(self._g_sources))) if G else None
         self._solver: piqp.SparseSolver | None = None
 
-    def aim(self, problem: NonlinearMpcProblem) -> None:
+    def set_reference(self, problem: NonlinearMpcProblem) -> None:
         """Solves this problem from now on, which differs in x_ref and u_ref alone."""
         if problem is not self.problem:
             self.problem = problem
@@ -159,15 +159,15 @@ class StageQp:
                 limited = np.flatnonzero(np.isfinite(bound))
                 rows = first + np.arange(N * len(limited)).reshape(N, len(limited))
                 columns = self._x[:, limited]
-                terms.append(_ones(rows.ravel(), columns.ravel(), sign))
-                terms.append(_ones(rows.ravel(), np.repeat(self._s, len(limited)), -1.0))
+                terms.append(_constant_terms(rows.ravel(), columns.ravel(), sign))
+                terms.append(_constant_terms(rows.ravel(), np.repeat(self._s, len(limited)), -1.0))
                 h.append(np.tile(bound[limited], N))
                 first += rows.size
         if size:
             rows = first + np.arange(N * size).reshape(N, size)
             terms.append(block_terms(rows, self._x, 1))
             if problem.soft:
-                terms.append(_ones(rows.ravel(), np.repeat(self._s, size), -1.0))
+                terms.append(_constant_terms(rows.ravel(), np.repeat(self._s, size), -1.0))
             h.append(np.zeros(N * size))
             first += rows.size
         if not first:
@@ -182,7 +182,7 @@ class StageQp:
             (self._x[:-1], problem.Q),
             (self._x[-1:], problem.Q_f),
         )
-        parts = [_entries(variables, weight) for variables, weight in blocks]
+        parts = [_block_entries(variables, weight) for variables, weight in blocks]
         row, column, value = (np.concatenate(part) for part in zip(*parts, strict=True))
         return csc_matrix((value / self._unit, (row, column)), shape=(self.n, self.n))
 
@@ -210,7 +210,9 @@ class StageQp:
         return lower, upper
 
 
-def _places(N: int, nx: int, nu: int, soft: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _variable_indices(
+    N: int, nx: int, nu: int, soft: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Where u_k, x_(k+1) and s_(k+1) are in z: (N, nu), (N, nx), (N, 1 or 0)."""
     width = nu + nx + soft
     stages = np.arange(N * width).reshape(N, width)
@@ -220,21 +222,21 @@ def _places(N: int, nx: int, nu: int, soft: bool) -> tuple[np.ndarray, np.ndarra
 @lru_cache(maxsize=128)
 def _dynamics_assembly(N: int, nx: int, nu: int, soft: bool, fixed: tuple[int, ...]) -> Assembly:
     """Of sources 1, A_1 ... A_(N-1), B_0 ... B_(N-1); `fixed` are the states that x_T gives."""
-    u, x, _ = _places(N, nx, nu, soft)
+    u, x, _ = _variable_indices(N, nx, nu, soft)
     rows = np.arange(N * nx).reshape(N, nx)
     ends = N * nx + np.arange(len(fixed))
     first_b = 1 + (N - 1) * nx * nx
     return Assembly(
         (N * nx + len(fixed), N * (nu + nx + soft)),
         first_b + N * nx * nu,
-        _ones(rows.ravel(), x.ravel()),
+        _constant_terms(rows.ravel(), x.ravel()),
         block_terms(rows[1:], x[:-1], 1, -1.0),
         block_terms(rows, u, first_b, -1.0),
-        _ones(ends, x[-1, list(fixed)]),
+        _constant_terms(ends, x[-1, list(fixed)]),
     )
 
 
-def _entries(variables: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, ...]:
+def _block_entries(variables: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, ...]:
     """Rows, columns and values of the same weight (n, n) on each of the variables (k, n)."""
     a, b = np.nonzero(weight)
     return variables[:, a].ravel(), variables[:, b].ravel(), np.tile(weight[a, b], len(variables))
@@ -249,7 +251,7 @@ def _scales(problem: NonlinearMpcProblem) -> tuple[np.ndarray, float]:
     return np.where(np.isfinite(width), width, np.sqrt(unit / np.diag(problem.R))), unit
 
 
-def _ones(rows: np.ndarray, columns: np.ndarray, coefficient: float = 1.0) -> MatrixTerms:
+def _constant_terms(rows: np.ndarray, columns: np.ndarray, coefficient: float = 1.0) -> MatrixTerms:
     """The coefficient itself: its source is the first, a one."""
     return MatrixTerms(rows, columns, np.zeros(len(rows), int), np.full(len(rows), coefficient))
 
@@ -257,7 +259,7 @@ def _ones(rows: np.ndarray, columns: np.ndarray, coefficient: float = 1.0) -> Ma
 def _solver(tolerance: float) -> piqp.SparseSolver:
     solver = piqp.SparseSolver()
     solver.settings.kkt_solver = piqp.sparse_multistage
-    solver.settings.max_iter = MOST_ITERATIONS
+    solver.settings.max_iter = MAX_ITERATIONS
     solver.settings.preconditioner_iter = 0  # it would scale back and forth what stays the same
     for name in ("eps_abs", "eps_rel", "eps_duality_gap_abs", "eps_duality_gap_rel"):
         setattr(solver.settings, name, tolerance)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labs.algorithms.exploration import FOLLOW, BehaviourPolicy
+from labs.algorithms.exploration import FIXED_POLICY, BehaviourPolicy
 from labs.algorithms.q_learning import q_learning
 from labs.algorithms.sarsa import sarsa, sarsa_n
 from labs.algorithms.sarsa_lambda import sarsa_lambda
@@ -22,7 +22,7 @@ from labs.problems.episodes import (
     initial_state,
     transition,
 )
-from labs.random_numbers import seeded
+from labs.random_numbers import random_states
 
 Q_LEARNING, SARSA, SARSA_N, SARSA_LAMBDA = range(4)
 _ALGORITHMS = (q_learning, sarsa, sarsa_n, sarsa_lambda)
@@ -42,7 +42,7 @@ class Learners:
     """(S, k) discounted cost of each episode of the last step."""
     lengths: np.ndarray
     """(S, k) int64: its number of transitions."""
-    sound: bool = True
+    bounded: bool = True
     """False once an estimate has left all bounds; `step` then has no effect."""
 
 
@@ -51,7 +51,7 @@ def init(shape: tuple[int, int], seeds: int, rng: np.random.Generator, q0: float
     return Learners(
         q=np.full((seeds, *shape), q0),
         visits=np.zeros((seeds, *shape), np.int32),
-        random=seeded(rng, seeds),
+        random=random_states(rng, seeds),
         costs=np.zeros((seeds, 0)),
         lengths=np.zeros((seeds, 0), np.int64),
     )
@@ -67,7 +67,7 @@ def step(
 ) -> Learners:
     """The learners after so many further episodes. Raises LabError where the pieces do not fit."""
     _check(task, behaviour, rule, learners)
-    if not learners.sound:
+    if not learners.bounded:
         return learners
     q, visits, random = learners.q.copy(), learners.visits.copy(), learners.random.copy()
     costs = np.zeros((len(q), episodes))
@@ -78,7 +78,7 @@ def step(
         for tables in zip(q, visits, random, costs, lengths, strict=True)
     )
     return replace(
-        learners, q=q, visits=visits, random=random, costs=costs, lengths=lengths, sound=sound
+        learners, q=q, visits=visits, random=random, costs=costs, lengths=lengths, bounded=sound
     )
 
 
@@ -115,7 +115,7 @@ def _check(
         )
     if not len(task.starts) or not (task.starts < states).all():
         raise LabError(f"starts = {task.starts}: takes at least one state below {states}")
-    if len(behaviour.policy) != (states if behaviour.kind == FOLLOW else 0):
+    if len(behaviour.policy) != (states if behaviour.kind == FIXED_POLICY else 0):
         raise LabError(
             f"a policy of {len(behaviour.policy)} controls: one for each of {states} states goes"
         )

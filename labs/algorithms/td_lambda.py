@@ -25,7 +25,7 @@ Each update takes one episode and changes V and visits in place, as in `monte_ca
 
 import numpy as np
 
-from labs.algorithms.monte_carlo import move_to_returns
+from labs.algorithms.monte_carlo import update_to_returns
 from labs.compiled import compiled
 from labs.problems.episodes import UpdateRule, step_size
 from labs.problems.prediction import Episode
@@ -44,7 +44,7 @@ def lambda_return(
     for t in range(T - 1, -1, -1):
         J = episode.costs[t] + gamma * ((1.0 - lam) * V[states[t + 1]] + lam * J)
         episode.returns[t] = J
-    move_to_returns(episode, T, rule, V, N)
+    update_to_returns(episode, T, rule, V, N)
 
 
 @compiled

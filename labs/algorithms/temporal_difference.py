@@ -16,7 +16,7 @@ as in `monte_carlo`."""
 
 import numpy as np
 
-from labs.algorithms.monte_carlo import costs_to_go, move
+from labs.algorithms.monte_carlo import costs_to_go, update_value
 from labs.compiled import compiled, inlined
 from labs.problems.episodes import UpdateRule
 from labs.problems.prediction import Episode
@@ -39,7 +39,7 @@ def td0(
     learned = V.copy() if rule.offline else V
     for t in range(T):
         target = episode.costs[t] + gamma * V[episode.states[t + 1]]
-        move(rule, V, N, learned, episode.states[t], target)
+        update_value(rule, V, N, learned, episode.states[t], target)
     if rule.offline:
         V[:] = learned
 
@@ -53,25 +53,25 @@ def n_step(
     states = episode.states
     first = max(T - rule.n, 0)  # The first of the steps whose return reaches the end.
     for t in range(first):
-        _learn_from_n_costs(gamma, episode, t, rule, V, N, learned)
+        _n_step_update(gamma, episode, t, rule, V, N, learned)
     costs_to_go(gamma, episode, T, V[states[T]], first)
     for t in range(first, T):
-        move(rule, V, N, learned, states[t], episode.returns[t])
+        update_value(rule, V, N, learned, states[t], episode.returns[t])
     if rule.offline:
         V[:] = learned
 
 
 @compiled
-def n_step_so_far(
+def n_step_ongoing(
     gamma: float, episode: Episode, T: int, rule: UpdateRule, V: np.ndarray, N: np.ndarray
 ) -> None:
     """What online n-step TD has learned after T steps of an episode that goes on."""
     for t in range(T - rule.n + 1):
-        _learn_from_n_costs(gamma, episode, t, rule, V, N, V)
+        _n_step_update(gamma, episode, t, rule, V, N, V)
 
 
 @inlined
-def _learn_from_n_costs(
+def _n_step_update(
     gamma: float,
     episode: Episode,
     t: int,
@@ -81,4 +81,4 @@ def _learn_from_n_costs(
     learned: np.ndarray,
 ) -> None:
     J = n_step_return(gamma, episode, t, rule.n, V[episode.states[t + rule.n]])
-    move(rule, V, N, learned, episode.states[t], J)
+    update_value(rule, V, N, learned, episode.states[t], J)

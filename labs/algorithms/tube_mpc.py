@@ -26,7 +26,7 @@ from typing import NamedTuple
 import daqp
 import numpy as np
 
-from labs.algorithms.linear_mpc_condensed import EQUALITY, SETTINGS, SOLVED, Condensed
+from labs.algorithms.linear_mpc_condensed import DAQP_SETTINGS, EQUALITY, SOLVED, CondensedQp
 from labs.algorithms.linear_mpc_limits import ProblemTerms
 from labs.algorithms.polytopes import is_empty
 from labs.algorithms.robust_invariant_set import RobustInvariantSet
@@ -35,13 +35,13 @@ from labs.problems.polyhedron import Polyhedron
 from labs.problems.receding_horizon import Plan
 from labs.resumable import Resumable
 
-PIECE = 0.004
+SECONDS_BETWEEN_PAUSES = 0.004
 """[s] of work between two pauses."""
-ROUNDING = 1e-9
+TUBE_TOLERANCE = 1e-9
 """By how much the measured state may leave its tube: what rounding adds in a period."""
 
 
-class Tubes(NamedTuple):
+class TubeValues(NamedTuple):
     """What is planned from many states; NaN where no plan is found."""
 
     z: np.ndarray
@@ -52,7 +52,9 @@ class Tubes(NamedTuple):
     """(k,)"""
 
 
-def tightened(problem: LinearMpcProblem, S: RobustInvariantSet, K: np.ndarray) -> LinearMpcProblem:
+def tighten_problem(
+    problem: LinearMpcProblem, S: RobustInvariantSet, K: np.ndarray
+) -> LinearMpcProblem:
     """The nominal problem: X less S, U less K S. Its terminal set is the nominal state's, and
     stays."""
     X, U = problem.state_set, problem.control_set
@@ -70,12 +72,12 @@ class TubePlanner:
     def __init__(self, nominal: LinearMpcProblem, S: Polyhedron, K: np.ndarray) -> None:
         """Of the tightened problem."""
         self.nominal, self.S, self.K = nominal, S, K
-        self._programmes: dict[int, _Programme] = {}
+        self._programmes: dict[int, _TubeQp] = {}
 
     def plan(self, x: np.ndarray, guess: Plan | None, N: int | None = None) -> Resumable[Plan]:
         """From the measured x (n,); the guess is not looked at."""
         begun = perf_counter()
-        programme = self._programme(self.nominal.N if N is None else N)
+        programme = self._qp_of_horizon(self.nominal.N if N is None else N)
         yield
         found, z, V, value, iterations = programme.solve(x)
         A, B, X = self.nominal.A, self.nominal.B, [z]
@@ -86,32 +88,32 @@ class TubePlanner:
             U=V,
             cost=value,
             found=found,
-            message="Solved." if found else self._why_not(),
+            message="Solved." if found else self._infeasible_message(),
             iterations=iterations,
             K=self.K,
             seconds={"QP": perf_counter() - begun},
         )
 
-    def values(self, states: np.ndarray) -> Resumable[Tubes]:
+    def values(self, states: np.ndarray) -> Resumable[TubeValues]:
         """Of the states (k, n), one by one."""
         k, n, m = len(states), self.nominal.n, self.nominal.m
-        tubes = Tubes(np.full((k, n), np.nan), np.full((k, m), np.nan), np.full(k, np.nan))
-        programme, begun = self._programme(self.nominal.N), perf_counter()
+        tubes = TubeValues(np.full((k, n), np.nan), np.full((k, m), np.nan), np.full(k, np.nan))
+        programme, begun = self._qp_of_horizon(self.nominal.N), perf_counter()
         for i, x in enumerate(states):
             found, z, V, value, _ = programme.solve(x)
             if found:
                 tubes.z[i], tubes.u[i], tubes.V[i] = z, V[0] + self.K @ (x - z), value
-            if perf_counter() - begun > PIECE:
+            if perf_counter() - begun > SECONDS_BETWEEN_PAUSES:
                 yield
                 begun = perf_counter()
         return tubes
 
-    def _programme(self, N: int) -> "_Programme":
+    def _qp_of_horizon(self, N: int) -> "_TubeQp":
         if N not in self._programmes:
-            self._programmes[N] = _Programme(self.nominal, self.S, N)
+            self._programmes[N] = _TubeQp(self.nominal, self.S, N)
         return self._programmes[N]
 
-    def _why_not(self) -> str:
+    def _infeasible_message(self) -> str:
         for name, limits in (("X", self.nominal.state_set), ("U", self.nominal.control_set)):
             if is_empty(limits):
                 return (
@@ -124,14 +126,14 @@ class TubePlanner:
         )
 
 
-class _Programme:
+class _TubeQp:
     """The quadratic programme in (z_0, v_0, ..., v_(N-1)) over N steps."""
 
     def __init__(self, nominal: LinearMpcProblem, S: Polyhedron, N: int) -> None:
         self.terms, self.S, self.shape = ProblemTerms.of(nominal, N), S, (N, nominal.m)
-        form = Condensed(nominal, N)
+        form = CondensedQp(nominal, N)
         data = form.data(self.terms)
-        slope, self.constant = data.free
+        slope, self.constant = data.uncontrolled_cost
         H = np.block([[form.M, form.F.T], [form.F, form.H]])
         rows = [np.hstack([form.E, form.G]), np.hstack([S.H, np.zeros((len(S.h), N * nominal.m))])]
         self.lower = np.concatenate([data.lower, np.zeros(len(S.h))])
@@ -139,13 +141,13 @@ class _Programme:
         self.sense = np.zeros(len(upper), dtype=np.int32)
         self.sense[: len(data.upper)][data.upper <= data.lower] = EQUALITY
         # Where a limit contradicts itself, or H has lost its digits, there is nothing to solve.
-        self.solvable = not (data.upper < data.lower - ROUNDING).any()
+        self.solvable = not (data.upper < data.lower - TUBE_TOLERANCE).any()
         self.model = daqp.Model()
         if self.solvable:
             f = np.concatenate([slope, data.f])
             flag, _ = self.model.setup(H, f, np.vstack(rows), upper, self.lower, self.sense)
             self.solvable = flag >= 0
-            self.model.settings = SETTINGS
+            self.model.settings = DAQP_SETTINGS
 
     def solve(self, x: np.ndarray) -> tuple[bool, np.ndarray, np.ndarray, float, int]:
         """Whether there is a solution, z_0 (n,), V (N, m), V_N and the iterations."""
@@ -153,7 +155,7 @@ class _Programme:
         if not self.solvable:
             return False, np.zeros(n), np.zeros((N, m)), np.nan, 0
         lower = self.lower.copy()
-        lower[len(lower) - len(self.S.h) :] = self.S.H @ x - self.S.h - ROUNDING
+        lower[len(lower) - len(self.S.h) :] = self.S.H @ x - self.S.h - TUBE_TOLERANCE
         # What it starts from is said anew, so that its answer depends on nothing that was before.
         self.model.update(blower=lower, sense=self.sense)
         y, value, flag, info = self.model.solve()

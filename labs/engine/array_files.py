@@ -19,7 +19,7 @@ MAX_ARRAYS = 2000
 MAX_NAME = 200
 """Characters."""
 MAX_AXES = 8
-MAX_MARKS = {b"[": 20_000, b"{": 20_000, b'"': 100_000, b",": 2**22}
+MAX_JSON_TOKENS = {b"[": 20_000, b"{": 20_000, b'"': 100_000, b",": 2**22}
 """How often these may stand in JSON: lists, objects, ends of texts, values. An array saved by us
 has one object and two lists; no lab's solution comes near any of these numbers."""
 MAGIC = b"\x93NUMPY\x01\x00"
@@ -28,7 +28,7 @@ HEADER = re.compile(
     r"'shape': \(((?:\d{1,10}(?:, ?)?){0,8})\), \} *\n"
 )
 DTYPES = re.compile(r"bool|u?int(8|16|32|64)|float(16|32|64)|complex(64|128)")
-NUMBERS = {int, float, bool, type(None)}
+JSON_NUMBER_TYPES = {int, float, bool, type(None)}
 
 
 # JSON -----------------------------------------------------------------------------------------
@@ -39,7 +39,7 @@ def parse_json(data: bytes) -> Any:
     parts are counted before."""
     import orjson  # on demand: a headless run without files needs no reader
 
-    for mark, most in MAX_MARKS.items():
+    for mark, most in MAX_JSON_TOKENS.items():
         if data.count(mark) > most:
             raise ValueError(f"it has more than {most} of the sign {mark.decode()}")
     return orjson.loads(data)
@@ -77,7 +77,7 @@ def _from_json(name: str, spelled: Mapping[str, Any], most: int) -> np.ndarray:
         kind = np.dtype(f"U{max(map(len, values), default=1) or 1}")
     elif isinstance(dtype, str) and DTYPES.fullmatch(dtype):
         kind = np.dtype(dtype)
-        if not set(map(type, values)) <= NUMBERS:
+        if not set(map(type, values)) <= JSON_NUMBER_TYPES:
             raise ValueError(f"{name} holds more than numbers")
         # What is not a number in JSON was not finite.
         values = [math.nan if value is None else value for value in values]

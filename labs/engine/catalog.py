@@ -62,7 +62,7 @@ def catalog() -> dict[str, CatalogEntry]:
     return found
 
 
-def find(slug: str) -> CatalogEntry:
+def find_lab(slug: str) -> CatalogEntry:
     """The lab of this name. Raises UnknownLab, which lists those there are."""
     try:
         return catalog()[slug]

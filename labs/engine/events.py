@@ -33,14 +33,14 @@ class Event:
     value: Any = None
 
 
-def events_of(about: Mapping[str, Any]) -> list[Event]:
+def events_from_recording(about: Mapping[str, Any]) -> list[Event]:
     """The events of an exported recording, to run it again. Raises LabError."""
     if not about["changes_complete"]:
         raise LabError("this recording lost its early changes: it cannot be run again exactly")
-    return [_event_of(change) for change in about["changes"]]
+    return [_event_from_change(change) for change in about["changes"]]
 
 
-def _event_of(change: Mapping[str, Any]) -> Event:
+def _event_from_change(change: Mapping[str, Any]) -> Event:
     step, kind, name, value = (change[key] for key in ("step", "kind", "name", "value"))
     match kind:
         case "set":

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
-from labs.engine.catalog import CatalogEntry, find
+from labs.engine.catalog import CatalogEntry, find_lab
 from labs.engine.events import Event
 from labs.engine.run import World
 from labs.engine.solution import Solution
@@ -12,7 +12,7 @@ from labs.errors import ParameterError
 MAX_STEPS = 2_000_000
 
 
-def run(
+def run_headless(
     slug: str,
     changes: Mapping[str, object] | None = None,
     *,
@@ -29,7 +29,7 @@ def run(
     `solution`, if given, with its parameters but for the `changes`, and its seed (else 0). A
     solution that is done is not solved further. `progress` hears the part of the steps done in
     [0, 1], again and again."""
-    entry = find(slug)
+    entry = find_lab(slug)
     period = entry.lab.period
     if not 0 <= seconds <= MAX_STEPS * period:
         raise ParameterError(
@@ -38,7 +38,7 @@ def run(
     steps = round(seconds / period) if entry.lab.has_world() else 0
     todo = sorted(events, key=lambda event: event.step)
     if solution:
-        solution = _with_changes(entry, solution, changes or {}, seed)
+        solution = _override_params(entry, solution, changes or {}, seed)
     world = World(entry, changes, seed or 0, steps + 1, solution)
     iterations_given = any(event.name == "iterate" for event in todo if event.kind == "solve")
 
@@ -49,10 +49,10 @@ def run(
     for step in range(steps + 1):
         while todo and todo[0].step <= step:
             if todo[0].name == "show" and not iterations_given:
-                _solve(world, heard)
-            _apply(world, todo.pop(0))
+                _solve_to_end(world, heard)
+            _apply_event(world, todo.pop(0))
         if not iterations_given:
-            _solve(world, heard)
+            _solve_to_end(world, heard)
         if step == steps or world.trouble:
             break
         world.advance()
@@ -65,14 +65,14 @@ def run(
     return world
 
 
-def _solve(world: World, heard: Callable[[], None]) -> None:
+def _solve_to_end(world: World, heard: Callable[[], None]) -> None:
     """To the end, unless a loaded solution was there already; `heard` after every iteration."""
     while world.solving and not (world.latest and world.latest.done):
         world.iterate()
         heard()
 
 
-def _with_changes(
+def _override_params(
     entry: CatalogEntry, solution: Solution, changes: Mapping[str, object], seed: int | None
 ) -> Solution:
     """The solution with other parameters: where they are another problem, it is not done."""
@@ -88,7 +88,7 @@ def _with_changes(
     )
 
 
-def _apply(world: World, event: Event) -> None:
+def _apply_event(world: World, event: Event) -> None:
     match event.kind:
         case "set":
             tunable = world.params.tunables.get(event.name)

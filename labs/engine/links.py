@@ -10,7 +10,7 @@ from labs.params import Knob, Params
 
 SEED = "seed"
 LARGEST_SEED = 2**32 - 1
-SHOWN = 40
+MAX_QUOTED_LENGTH = 40
 """Letters of a name or a value that a remark repeats."""
 
 P = TypeVar("P", bound=Params)
@@ -24,7 +24,7 @@ def read_link(defaults: P, texts: Mapping[str, str]) -> tuple[P, int | None, lis
     seed = _seed(texts.pop(SEED), remarks) if SEED in texts else None
     known = {name: text for name, text in texts.items() if name in defaults.tunables}
     remarks += [
-        f"{_short(name)} is no parameter of this lab, and was left out"
+        f"{_truncate(name)} is no parameter of this lab, and was left out"
         for name in texts
         if name not in known
     ]
@@ -35,7 +35,7 @@ def read_link(defaults: P, texts: Mapping[str, str]) -> tuple[P, int | None, lis
             values[name] = clipped = min(max(value, knob.low), knob.high)
             if clipped != value:
                 end = f"the {'least' if clipped > value else 'most'} it takes"
-                remarks.append(f"{name} = {_short(known[name])} became {clipped:g}, {end}")
+                remarks.append(f"{name} = {_truncate(known[name])} became {clipped:g}, {end}")
     try:
         return defaults.change(values), seed, remarks
     except ParameterError:
@@ -52,9 +52,9 @@ def read_link(defaults: P, texts: Mapping[str, str]) -> tuple[P, int | None, lis
 def _seed(text: str, remarks: list[str]) -> int | None:
     if text.isascii() and text.isdigit() and len(text) <= 10 and int(text) <= LARGEST_SEED:
         return int(text)
-    remarks.append(f"seed = {_short(text)}: it takes a whole number from 0 to {LARGEST_SEED}")
+    remarks.append(f"seed = {_truncate(text)}: it takes a whole number from 0 to {LARGEST_SEED}")
     return None
 
 
-def _short(text: str) -> str:
-    return text if len(text) <= SHOWN else f"{text[:SHOWN]}…"
+def _truncate(text: str) -> str:
+    return text if len(text) <= MAX_QUOTED_LENGTH else f"{text[:MAX_QUOTED_LENGTH]}…"

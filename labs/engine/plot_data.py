@@ -20,7 +20,7 @@ import numpy as np
 from labs.engine.record import csv_table, versions
 from labs.engine.run import World
 from labs.errors import LabError
-from labs.number_texts import with_minus
+from labs.number_texts import with_minus_signs
 from labs.plots import (
     Bars,
     Card,
@@ -30,11 +30,11 @@ from labs.plots import (
     Note,
     Readout,
     TimeSeries,
+    channel_names,
     describe,
     field_names,
     is_shown,
     label_names,
-    measured,
 )
 
 TOLERANCE = 1e-9
@@ -72,7 +72,7 @@ class PlotData:
             "iteration": world.shown.iteration if world.shown else None,
             "versions": versions(),
         }
-        return cls(about, [(plot, _data(plot, channels, known)) for plot in wanted])
+        return cls(about, [(plot, _plot_arrays(plot, channels, known)) for plot in wanted])
 
     def csv(self) -> bytes:
         """The table of one plot. Raises LabError unless it is one."""
@@ -108,7 +108,7 @@ def named_values(world: World) -> dict[str, np.ndarray | str | tuple[str, ...]]:
     notes = world.lab.notes(world.params, world.state)
     return {
         **world.lab.fields(world.params, world.state),
-        **{name: with_minus(text) for name, text in notes.items()},
+        **{name: with_minus_signs(text) for name, text in notes.items()},
         **world.lab.labels(world.params),
     }
 
@@ -118,10 +118,10 @@ def file_name(title: str) -> str:
     return re.sub(r"[^\w]+", "-", title.lower(), flags=re.ASCII).strip("-") or "plot"
 
 
-def _data(plot: Card, channels: _Arrays, known: _Arrays) -> _Arrays:
+def _plot_arrays(plot: Card, channels: _Arrays, known: _Arrays) -> _Arrays:
     """What a plot names, and nothing else; the world may go on meanwhile."""
     if isinstance(plot, TimeSeries):
-        found = {name: channels[name] for name in ("t", *measured(plot)) if name in channels}
+        found = {name: channels[name] for name in ("t", *channel_names(plot)) if name in channels}
     else:
         found = {name: known[name] for name in field_names(plot) if name in known}
     found |= {name: known[name] for name in label_names(plot) if name in known}
@@ -140,7 +140,7 @@ def _csv(plot: Card, data: _Arrays) -> bytes:
 
 def _time_series(plot: TimeSeries, data: _Arrays) -> _Table:
     columns = {"t": data["t"]}
-    for name in dict.fromkeys(measured(plot)):
+    for name in dict.fromkeys(channel_names(plot)):
         values = data.get(name, np.empty(0))
         several = values.ndim == 2
         parts = {f"{name}[{i}]": values[:, i] for i in range(values.shape[1])} if several else {}
@@ -150,7 +150,7 @@ def _time_series(plot: TimeSeries, data: _Arrays) -> _Table:
 
 def _curves(plot: Curves, data: _Arrays) -> _Table:
     noted = any(trace.note for trace in plot.traces)
-    x_name, y_name = _fill(plot.x_label, data), _fill(plot.y_label, data)
+    x_name, y_name = _fill_label(plot.x_label, data), _fill_label(plot.y_label, data)
     header = ("curve", x_name or "x", (y_name if y_name != x_name else "") or "y")
     return (*header, "note") if noted else header, _points(plot, data, noted)
 
@@ -163,7 +163,7 @@ def _points(plot: Curves, data: _Arrays, noted: bool) -> Iterable[Sequence[Any]]
         notes = np.ravel(data[trace.note]) if trace.note and trace.note in data else ()
         for k in range(count):
             label = trace.label if isinstance(trace.label, str) else trace.label[k]
-            name = _fill(label, data, k) or (f"{trace.y}[{k}]" if ys.ndim == 2 else trace.y)
+            name = _fill_label(label, data, k) or (f"{trace.y}[{k}]" if ys.ndim == 2 else trace.y)
             note = [notes[k] if k < len(notes) else None] if noted else []
             of_x, of_y = (a[:, k] if a.ndim == 2 else a for a in (xs, ys))
             for x, y in zip(of_x, of_y, strict=True):
@@ -171,7 +171,7 @@ def _points(plot: Curves, data: _Arrays, noted: bool) -> Iterable[Sequence[Any]]
 
 
 def _heat_map(plot: HeatMap, data: _Arrays) -> _Table:
-    labels = [_fill(text, data) for text in (plot.x_label, plot.y_label, plot.z_label)]
+    labels = [_fill_label(text, data) for text in (plot.x_label, plot.y_label, plot.z_label)]
     names = [label or name for label, name in zip(labels, "xyz", strict=True)]
     header = names if len(set(names)) == 3 else ["x", "y", "z"]
     x, y, z = (np.asarray(data[name]) for name in (plot.x, plot.y, plot.z))
@@ -220,7 +220,7 @@ TABLES: Mapping[type, Callable[[Any, _Arrays], _Table]] = {
 }
 
 
-def _fill(text: str, data: _Arrays, k: int | None = None) -> str:
+def _fill_label(text: str, data: _Arrays, k: int | None = None) -> str:
     """A label with its words, as the page has it (static/js/plots/placeholders.js)."""
 
     def word(match: re.Match[str]) -> str:

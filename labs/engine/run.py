@@ -18,7 +18,7 @@ from labs.engine.snapshots import Snapshots
 from labs.engine.solution import Solution
 from labs.errors import LabError, ParameterError
 from labs.lab import Inputs, Snapshot
-from labs.plots import measured
+from labs.plots import channel_names
 from labs.scene import NullScene
 
 MAX_EVENTS = 20_000
@@ -106,7 +106,7 @@ class World:
             # Says that the events tell how far the solver went, even if it goes nowhere.
             self._record_event(Event(0, "solve", "iterate", 0))
         first = self.lab.measure(self.params, self.state)
-        scalars = [name for plot in self.lab.plots for name in measured(plot)]
+        scalars = [name for plot in self.lab.plots for name in channel_names(plot)]
         self.recorder = Recorder(first, scalars, self._capacity)
         self.recorder.add(self.t, first)
 

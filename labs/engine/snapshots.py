@@ -11,7 +11,7 @@ from labs.lab import Snapshot
 
 MAX_BYTES = 64 * 2**20
 """Of arrays, all snapshots together."""
-OVERHEAD = 1024
+SNAPSHOT_OVERHEAD = 1024
 """[bytes] What a snapshot counts beside its arrays."""
 
 
@@ -44,7 +44,9 @@ class Snapshots:
     def add(self, snapshot: Snapshot) -> None:
         """Keeps one that is later than all before it."""
         self._kept.append(snapshot)
-        self._sizes.append(OVERHEAD + sum(array.nbytes for _, array in flatten(snapshot.data)))
+        self._sizes.append(
+            SNAPSHOT_OVERHEAD + sum(array.nbytes for _, array in flatten(snapshot.data))
+        )
         self._total += self._sizes[-1]
         while len(self._kept) > 2 and self._total > self._most:
             self._thin()

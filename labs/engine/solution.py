@@ -29,10 +29,10 @@ from labs.errors import LabError
 from labs.lab import Snapshot
 from labs.params import Value
 
-FORMS = ("json", "npz")
-RESULTS = "results/"
-KINDS = {"b": "truth values", "i": "whole numbers", "f": "numbers", "c": "complex numbers"}
-KINDS |= {"u": KINDS["i"], "U": "text"}
+FILE_FORMATS = ("json", "npz")
+RESULTS_PREFIX = "results/"
+DTYPE_NAMES = {"b": "truth values", "i": "whole numbers", "f": "numbers", "c": "complex numbers"}
+DTYPE_NAMES |= {"u": DTYPE_NAMES["i"], "U": "text"}
 
 
 class _About(BaseModel):
@@ -99,7 +99,7 @@ class Solution:
     def npz(self) -> bytes:
         data = io.BytesIO()
         about = np.array(json.dumps(self.about()))
-        results = {f"{RESULTS}{name}": a for name, a in self.results.items()}
+        results = {f"{RESULTS_PREFIX}{name}": a for name, a in self.results.items()}
         np.savez_compressed(data, about=about, **self.arrays, **results)  # type: ignore[arg-type]
         return data.getvalue()
 
@@ -116,23 +116,27 @@ class Solution:
             raise LabError("this is a recording as CSV, not a solution: a solution is NPZ or JSON")
         try:
             if data.startswith(b"PK"):
-                arrays = from_npz(data, without=RESULTS)
+                arrays = from_npz(data, without=RESULTS_PREFIX)
                 about = parse_json(str(arrays.pop("about")).encode())
-                return cls._checked(about, arrays)
+                return cls._from_validated(about, arrays)
             return cls.from_dict(parse_json(data))
         except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError) as error:
-            raise LabError(f"this is no solution saved by orclab ({_brief(error)})") from None
+            raise LabError(
+                f"this is no solution saved by orclab ({_error_message(error)})"
+            ) from None
         except (zipfile.BadZipFile, zlib.error, EOFError, OSError, RuntimeError) as error:
-            raise LabError(f"this NPZ file cannot be read ({_brief(error)})") from None
+            raise LabError(f"this NPZ file cannot be read ({_error_message(error)})") from None
 
     @classmethod
     def from_dict(cls, found: Mapping[str, Any]) -> "Solution":
         """What `to_dict` gave. Raises LabError, ValueError, KeyError or TypeError."""
         _refuse_recording(found)
-        return cls._checked(found, from_json(found["data"]))
+        return cls._from_validated(found, from_json(found["data"]))
 
     @classmethod
-    def _checked(cls, about: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> "Solution":
+    def _from_validated(
+        cls, about: Mapping[str, Any], arrays: Mapping[str, np.ndarray]
+    ) -> "Solution":
         _refuse_recording(about)
         try:
             checked = _About.model_validate(
@@ -155,7 +159,7 @@ class Solution:
                 f"this is a solution of {self.lab!r}, and here is {slug!r}: load it there"
             )
 
-    def fitted(self, own: Sequence[Snapshot]) -> Mapping[str, Any]:
+    def snapshot_data(self, own: Sequence[Snapshot]) -> Mapping[str, Any]:
         """The data of a snapshot, put together as the lab's `own` first ones are.
 
         Names, kinds and ranks have to be those of `own`, and shapes too, but along axes that
@@ -166,9 +170,11 @@ class Solution:
         ]
         wanted = dict(flatten(_without_durations(own[0].data)))
         if missing := sorted(wanted.keys() - self.arrays.keys()):
-            raise LabError(f"the solution lacks {_joined(missing)}: it is of another version")
+            raise LabError(f"the solution lacks {_join_names(missing)}: it is of another version")
         if unknown := sorted(self.arrays.keys() - wanted.keys()):
-            raise LabError(f"the solution has {_joined(unknown)}, of which this lab knows nothing")
+            raise LabError(
+                f"the solution has {_join_names(unknown)}, of which this lab knows nothing"
+            )
         fitted = {
             name: _cast_like(name, self.arrays[name], model, [s[name] for s in shapes if name in s])
             for name, model in wanted.items()
@@ -180,7 +186,7 @@ class Solution:
 
     def snapshot(self, own: Sequence[Snapshot]) -> Snapshot:
         """As `Lab.accept` takes it. Raises LabError."""
-        return Snapshot(self.iteration, self.fitted(own), self.done, self.progress)
+        return Snapshot(self.iteration, self.snapshot_data(own), self.done, self.progress)
 
 
 def _refuse_recording(about: Mapping[str, Any]) -> None:
@@ -200,8 +206,8 @@ def _cast_like(
     name: str, array: np.ndarray, model: np.ndarray, shapes: Sequence[tuple[int, ...]]
 ) -> np.ndarray:
     """The array with the type and layout of the lab's own."""
-    if KINDS.get(array.dtype.kind) != KINDS.get(model.dtype.kind):
-        kinds = [KINDS.get(a.dtype.kind, "something else") for a in (array, model)]
+    if DTYPE_NAMES.get(array.dtype.kind) != DTYPE_NAMES.get(model.dtype.kind):
+        kinds = [DTYPE_NAMES.get(a.dtype.kind, "something else") for a in (array, model)]
         raise LabError(f"{name} of the solution holds {kinds[0]}; it takes {kinds[1]}")
     if array.ndim != model.ndim or not all(
         size == own
@@ -246,9 +252,9 @@ def _unflatten(model: Any, path: str, arrays: Mapping[str, np.ndarray]) -> Any:
     return type(model)(arrays[path].item())
 
 
-def _joined(names: Sequence[str]) -> str:
+def _join_names(names: Sequence[str]) -> str:
     return ", ".join(names[:5]) + (" and more" if len(names) > 5 else "")
 
 
-def _brief(error: Exception) -> str:
+def _error_message(error: Exception) -> str:
     return f"{type(error).__name__}: {error}"[:200]

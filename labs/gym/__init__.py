@@ -13,13 +13,13 @@ try:
 except ImportError as error:
     raise ImportError("the extra gym is missing: pip install 'orclab[gym]'") from error
 
-CONTINUOUS = {"Pendulum": 200, "DoublePendulum": 200, "UR5Reach": 60}
+CONTINUOUS_HORIZONS = {"Pendulum": 200, "DoublePendulum": 200, "UR5Reach": 60}
 """States are continuous, torques few; with the horizon of each [steps]."""
-FINITE = {"GridWorld": 500, "RandomWalk": 50_000}
+FINITE_HORIZONS = {"GridWorld": 500, "RandomWalk": 50_000}
 """Finite MDPs, likewise."""
 
-for _name, _horizon in (CONTINUOUS | FINITE).items():
-    _module = "torques" if _name in CONTINUOUS else "tables"
+for _name, _horizon in (CONTINUOUS_HORIZONS | FINITE_HORIZONS).items():
+    _module = "torques" if _name in CONTINUOUS_HORIZONS else "tables"
     register(
         f"orclab/{_name}-v0",
         entry_point=f"labs.gym.{_module}:{_name}Env",

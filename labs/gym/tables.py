@@ -14,8 +14,8 @@ import numpy as np
 
 from labs.problems.episodes import episodic_task, initial_state, transition
 from labs.problems.finite_mdp import FiniteMDP
-from labs.random_numbers import seeded
-from labs.tasks.grid_world.map import MAPS, STEP, grid_world
+from labs.random_numbers import random_states
+from labs.tasks.grid_world.map import MAPS, STEP_COST, grid_world
 from labs.tasks.random_walk.walks import WalkShape, walk_mdp
 
 
@@ -39,7 +39,7 @@ class TableEnv(gymnasium.Env[np.int64, np.int64]):
     ) -> tuple[np.int64, dict[str, Any]]:
         """At the start, or in the state that `options` has under "state"."""
         super().reset(seed=seed)
-        self.random = seeded(self.np_random, 1)[0]
+        self.random = random_states(self.np_random, 1)[0]
         self.x = initial_state(self.task, self.random)
         if options and "state" in options:
             self.x = int(options["state"])
@@ -62,7 +62,7 @@ class GridWorldEnv(TableEnv):
         kings: bool = False,
         slip: float = 0.0,
         sideways: bool = False,
-        living: float = STEP,
+        living: float = STEP_COST,
         render_mode: str | None = None,
     ) -> None:
         self.world = grid_world(MAPS.get(map, map), kings)

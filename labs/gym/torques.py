@@ -14,12 +14,12 @@ import gymnasium
 import numpy as np
 
 from labs.problems.environment import Environment
-from labs.random_numbers import seeded
-from labs.tasks.environments.reach import RANGES, VELOCITY_LIMIT, reach
+from labs.random_numbers import random_states
+from labs.tasks.environments.reach import JOINT_RANGES, VELOCITY_LIMIT, reach
 from labs.tasks.environments.swing_up import swing_up
-from labs.tasks.environments.torque_task import PERIOD
+from labs.tasks.environments.torque_task import CONTROL_PERIOD
 
-ARM = 2.0
+LARGEST_TIP_DISTANCE = 2.0
 """[m] Between two places of the UR5's tip at most."""
 
 
@@ -44,17 +44,17 @@ class TorqueEnv(gymnasium.Env[np.ndarray, np.int64]):
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """A start drawn anew, or the state (nx,) that `options` has under "state"."""
         super().reset(seed=seed)
-        self.X = self.environment.starts(seeded(self.np_random, 1)[0], 1)
+        self.X = self.environment.initial_states(random_states(self.np_random, 1)[0], 1)
         if options and "state" in options:
             self.X = np.array(options["state"], float).reshape(1, self.environment.nx)
-        return self._observed()
+        return self._observation()
 
     def step(self, action: np.int64) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         self.X, costs, ends = self.environment.step(self.X, np.array([action], np.int32))
-        seen, info = self._observed()
+        seen, info = self._observation()
         return seen, -float(costs[0]), bool(ends[0]), False, info
 
-    def _observed(self) -> tuple[np.ndarray, dict[str, Any]]:
+    def _observation(self) -> tuple[np.ndarray, dict[str, Any]]:
         return self.environment.observe(self.X)[0], {"state": self.X[0].copy()}
 
 
@@ -85,6 +85,9 @@ class UR5ReachEnv(TorqueEnv):
     def __init__(self, render_mode: str | None = None) -> None:
         environment = reach()
         # As far as its joints get within an episode.
-        farthest = 0.5 * np.ptp(RANGES, axis=1) + VELOCITY_LIMIT * PERIOD * environment.horizon
-        limit = np.concatenate([farthest / np.pi, np.ones(2), np.full(4, ARM)])
+        farthest = (
+            0.5 * np.ptp(JOINT_RANGES, axis=1)
+            + VELOCITY_LIMIT * CONTROL_PERIOD * environment.horizon
+        )
+        limit = np.concatenate([farthest / np.pi, np.ones(2), np.full(4, LARGEST_TIP_DISTANCE)])
         super().__init__(environment, limit, render_mode)

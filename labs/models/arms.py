@@ -17,10 +17,10 @@ import pinocchio as pin
 from labs.errors import LabError
 from labs.shapes import (
     BLUE,
-    DARK,
-    LIGHT,
+    DARK_GRAY,
+    LIGHT_GRAY,
     ORANGE,
-    STEEL,
+    STEEL_COLORS,
     Box,
     Cylinder,
     Shape,
@@ -54,13 +54,13 @@ class Arm:
     """Where a viewer stands and what it looks at [m]."""
 
 
-TITLES = {
+ARM_TITLES = {
     "ur5": "UR5",
     "panda": "Franka Panda",
     "double-pendulum": "Double pendulum",
     "scara": "SCARA",
 }
-JOINTS = {"ur5": 6, "panda": 7, "double-pendulum": 2, "scara": 4}
+JOINT_COUNTS = {"ur5": 6, "panda": 7, "double-pendulum": 2, "scara": 4}
 """Known before an arm is loaded, which takes its meshes with it; so are the titles."""
 
 
@@ -68,17 +68,17 @@ JOINTS = {"ur5": 6, "panda": 7, "double-pendulum": 2, "scara": 4}
 def ur5() -> Arm:
     """UR5, 6 joints. Reflected rotor inertia: gear 101 with J = 2.5e-5 kg m^2 gives
     0.255 kg m^2 at the three large joints; the wrists' smaller motors give 0.061 kg m^2."""
-    model, collision, visual = _described("ur_description/urdf/ur5_robot.urdf")
+    model, collision, visual = _load_urdf("ur_description/urdf/ur5_robot.urdf")
     model.armature = np.array([0.255, 0.255, 0.255, 0.061, 0.061, 0.061])
     return Arm(
         name="ur5",
-        title=TITLES["ur5"],
+        title=ARM_TITLES["ur5"],
         model=model,
         home=np.array([0.0, -1.5, 1.6, -1.67, -1.57, 0.0]),
         torque_limit=model.effortLimit.copy(),
         tip=model.getFrameId("tool0"),
         visuals=_visuals(visual),
-        collisions=_in_steel(_visuals(collision)),
+        collisions=_color_as_steel(_visuals(collision)),
         camera=((1.05, -0.85, 0.75), (0.22, 0.05, 0.36)),
     )
 
@@ -87,7 +87,7 @@ def ur5() -> Arm:
 def panda() -> Arm:
     """Franka Panda, 7 joints, its fingers locked closed. Reflected rotor inertia 0.1 kg m^2 at
     every joint, the order of what identifications of this arm find."""
-    full, collision, visual = _described("panda_description/urdf/panda.urdf")
+    full, collision, visual = _load_urdf("panda_description/urdf/panda.urdf")
     fingers = [full.getJointId(f"panda_finger_joint{i}") for i in (1, 2)]
     model, (collision, visual) = pin.buildReducedModel(
         full, [collision, visual], fingers, pin.neutral(full)
@@ -95,13 +95,13 @@ def panda() -> Arm:
     model.armature = np.full(model.nv, 0.1)
     return Arm(
         name="panda",
-        title=TITLES["panda"],
+        title=ARM_TITLES["panda"],
         model=model,
         home=np.array([0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]),
         torque_limit=model.effortLimit.copy(),
         tip=model.getFrameId("panda_hand_tcp"),
         visuals=_visuals(visual),
-        collisions=_in_steel(_visuals(collision)),
+        collisions=_color_as_steel(_visuals(collision)),
         camera=((1.1, -0.95, 0.85), (0.14, 0.03, 0.42)),
     )
 
@@ -116,20 +116,22 @@ def double_pendulum() -> Arm:
     model.name = "double_pendulum"
     hanging = pin.SE3(np.eye(3), np.array([0.0, 0.0, -length / 2]))
     parent, hinge = 0, pin.SE3(np.eye(3), np.array([0.0, 0.0, height]))
-    visuals = [primitive(0, hinge * translation(-0.06, 0.0, 0.0), Box((0.06, 0.14, 0.14)), DARK)]
+    visuals = [
+        primitive(0, hinge * translation(-0.06, 0.0, 0.0), Box((0.06, 0.14, 0.14)), DARK_GRAY)
+    ]
     for name, color in (("shoulder", BLUE), ("elbow", ORANGE)):
         parent = model.addJoint(parent, pin.JointModelRX(), hinge, name)
         model.appendBodyToJoint(parent, pin.Inertia.FromCylinder(mass, radius, length), hanging)
         visuals += [
             primitive(parent, hanging, Cylinder(radius, length), color),
-            primitive(parent, pin.SE3.Identity(), Sphere(1.5 * radius), DARK),
+            primitive(parent, pin.SE3.Identity(), Sphere(1.5 * radius), DARK_GRAY),
         ]
         hinge = translation(0.0, 0.0, -length)
     visuals.append(primitive(parent, hinge, Sphere(1.2 * radius), color))
     tip = model.addFrame(pin.Frame("tip", parent, hinge, pin.FrameType.OP_FRAME))
     return Arm(
         name="double-pendulum",
-        title=TITLES["double-pendulum"],
+        title=ARM_TITLES["double-pendulum"],
         model=model,
         home=np.array([0.9, 0.6]),
         torque_limit=np.array([100.0, 50.0]),
@@ -156,15 +158,15 @@ def scara() -> Arm:
         model.addJointFrame(joint)
     links = {shoulder: (5.0, 0.4), elbow: (3.5, 0.3)}
     visuals = [
-        primitive(0, translation(0.0, 0.0, 0.01), Box((0.3, 0.3, 0.02)), DARK),
-        primitive(0, translation(0.0, 0.0, 0.23), Cylinder(0.07, 0.46), LIGHT),
+        primitive(0, translation(0.0, 0.0, 0.01), Box((0.3, 0.3, 0.02)), DARK_GRAY),
+        primitive(0, translation(0.0, 0.0, 0.23), Cylinder(0.07, 0.46), LIGHT_GRAY),
     ]
     for (joint, (mass, length)), color in zip(links.items(), (BLUE, ORANGE), strict=True):
         middle, size = translation(length / 2, 0.0, 0.0), (length, 0.11, 0.08)
         model.appendBodyToJoint(joint, pin.Inertia.FromBox(mass, *size), middle)
         visuals += [
             primitive(joint, middle, Box(size), color),
-            primitive(joint, pin.SE3.Identity(), Cylinder(0.075, 0.085), DARK),
+            primitive(joint, pin.SE3.Identity(), Cylinder(0.075, 0.085), DARK_GRAY),
         ]
     model.appendBodyToJoint(
         quill, pin.Inertia.FromCylinder(1.0, 0.018, 0.45), translation(0, 0, 0.06)
@@ -173,9 +175,9 @@ def scara() -> Arm:
         tool, pin.Inertia.FromBox(0.5, 0.1, 0.04, 0.03), translation(0, 0, -0.03)
     )
     visuals += [
-        primitive(elbow, translation(0.3, 0.0, 0.0), Cylinder(0.06, 0.14), DARK),
-        primitive(quill, translation(0.0, 0.0, 0.07), Cylinder(0.018, 0.46), LIGHT),
-        primitive(tool, translation(0.0, 0.0, -0.015), Cylinder(0.03, 0.03), DARK),
+        primitive(elbow, translation(0.3, 0.0, 0.0), Cylinder(0.06, 0.14), DARK_GRAY),
+        primitive(quill, translation(0.0, 0.0, 0.07), Cylinder(0.018, 0.46), LIGHT_GRAY),
+        primitive(tool, translation(0.0, 0.0, -0.015), Cylinder(0.03, 0.03), DARK_GRAY),
         primitive(tool, translation(0.0, 0.0, -0.04), Box((0.1, 0.03, 0.02)), BLUE),
     ]
     model.armature = np.array([0.3, 0.15, 5.0, 0.01])
@@ -186,7 +188,7 @@ def scara() -> Arm:
     tip = model.addFrame(pin.Frame("tip", tool, translation(0, 0, -0.05), pin.FrameType.OP_FRAME))
     return Arm(
         name="scara",
-        title=TITLES["scara"],
+        title=ARM_TITLES["scara"],
         model=model,
         home=np.array([-0.4, 1.2, 0.0, -0.8]),
         torque_limit=limit,
@@ -205,7 +207,7 @@ ARMS: Mapping[str, Callable[[], Arm]] = {
 }
 
 
-def load(name: str) -> Arm:
+def load_arm(name: str) -> Arm:
     """The arm of this name; the same object every time. Raises LabError, listing those there
     are."""
     try:
@@ -214,7 +216,7 @@ def load(name: str) -> Arm:
         raise LabError(f"no arm is named {name!r}; there are {', '.join(ARMS)}") from None
 
 
-def _described(urdf: str) -> tuple[pin.Model, pin.GeometryModel, pin.GeometryModel]:
+def _load_urdf(urdf: str) -> tuple[pin.Model, pin.GeometryModel, pin.GeometryModel]:
     """Model, collision and visual geometry of a URDF of example-robot-data."""
     share = Path(pin.__file__).parents[4] / "share"
     path = share / "example-robot-data" / "robots" / urdf
@@ -232,25 +234,25 @@ def _visuals(geometry: pin.GeometryModel) -> tuple[Visual, ...]:
         Visual(
             joint=int(piece.parentJoint),
             placement=piece.placement.copy(),
-            mesh="" if (shape := _shape(piece.geometry)) else str(piece.meshPath),
-            scale=_three(piece.meshScale),
+            mesh="" if (shape := _primitive_shape(piece.geometry)) else str(piece.meshPath),
+            scale=_vector3(piece.meshScale),
             shape=shape,
-            color=_three(piece.meshColor),
+            color=_vector3(piece.meshColor),
         )
         for piece in geometry.geometryObjects
     )
 
 
-def _in_steel(pieces: tuple[Visual, ...]) -> tuple[Visual, ...]:
+def _color_as_steel(pieces: tuple[Visual, ...]) -> tuple[Visual, ...]:
     """Light-weight shapes bring no material."""
-    return tuple(replace(piece, color=STEEL[piece.joint % 2]) for piece in pieces)
+    return tuple(replace(piece, color=STEEL_COLORS[piece.joint % 2]) for piece in pieces)
 
 
-def _shape(geometry: Any) -> Shape | None:
+def _primitive_shape(geometry: Any) -> Shape | None:
     """The primitive this collision geometry is; None for a mesh."""
     match type(geometry).__name__:
         case "Box":
-            return Box(_three(2 * geometry.halfSide))
+            return Box(_vector3(2 * geometry.halfSide))
         case "Cylinder":
             return Cylinder(float(geometry.radius), float(2 * geometry.halfLength))
         case "Sphere":
@@ -259,5 +261,5 @@ def _shape(geometry: Any) -> Shape | None:
             return None
 
 
-def _three(values: Any) -> Vector3:
+def _vector3(values: Any) -> Vector3:
     return float(values[0]), float(values[1]), float(values[2])

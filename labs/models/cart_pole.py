@@ -15,11 +15,21 @@ import numpy as np
 import pinocchio as pin
 
 from labs.models.arms import Arm
-from labs.shapes import BLUE, DARK, LIGHT, ORANGE, Box, Cylinder, Sphere, primitive, translation
+from labs.shapes import (
+    BLUE,
+    DARK_GRAY,
+    LIGHT_GRAY,
+    ORANGE,
+    Box,
+    Cylinder,
+    Sphere,
+    primitive,
+    translation,
+)
 
-CART, POLE, LENGTH, RADIUS = 1.0, 0.3, 0.6, 0.015
+CART_MASS, POLE_MASS, POLE_LENGTH, POLE_RADIUS = 1.0, 0.3, 0.6, 0.015
 """Masses of cart and rod [kg], length and radius of the rod [m]."""
-HINGE_HEIGHT, HALF_RAIL = 0.75, 1.5
+HINGE_HEIGHT, HALF_RAIL_LENGTH = 0.75, 1.5
 """Of the hinge over the floor; half the rail's length [m]. The rail has no end stops."""
 
 
@@ -30,24 +40,26 @@ def cart_pole() -> Arm:
     model.name = "cart_pole"
     cart = model.addJoint(0, pin.JointModelPY(), translation(0.0, 0.0, HINGE_HEIGHT), "cart")
     hinge = model.addJoint(cart, pin.JointModelRX(), pin.SE3.Identity(), "hinge")
-    middle, end = translation(0.0, 0.0, -LENGTH / 2), translation(0.0, 0.0, -LENGTH)
+    middle, end = translation(0.0, 0.0, -POLE_LENGTH / 2), translation(0.0, 0.0, -POLE_LENGTH)
     box, below = (0.16, 0.24, 0.1), translation(-0.1, 0.0, 0.0)
-    model.appendBodyToJoint(cart, pin.Inertia.FromBox(CART, *box), below)
-    model.appendBodyToJoint(hinge, pin.Inertia.FromCylinder(POLE, RADIUS, LENGTH), middle)
+    model.appendBodyToJoint(cart, pin.Inertia.FromBox(CART_MASS, *box), below)
+    model.appendBodyToJoint(
+        hinge, pin.Inertia.FromCylinder(POLE_MASS, POLE_RADIUS, POLE_LENGTH), middle
+    )
     tip = model.addFrame(pin.Frame("tip", hinge, end, pin.FrameType.OP_FRAME))
     along = pin.SE3(pin.rpy.rpyToMatrix(-np.pi / 2, 0.0, 0.0), np.array([-0.1, 0.0, HINGE_HEIGHT]))
     axle = pin.SE3(pin.rpy.rpyToMatrix(0.0, np.pi / 2, 0.0), np.array([-0.02, 0.0, 0.0]))
     post = Box((0.05, 0.05, HINGE_HEIGHT))
     visuals = (
-        primitive(0, along, Cylinder(0.018, 2 * HALF_RAIL), LIGHT),
+        primitive(0, along, Cylinder(0.018, 2 * HALF_RAIL_LENGTH), LIGHT_GRAY),
         *(
-            primitive(0, translation(-0.1, y, HINGE_HEIGHT / 2), post, DARK)
-            for y in (-HALF_RAIL, HALF_RAIL)
+            primitive(0, translation(-0.1, y, HINGE_HEIGHT / 2), post, DARK_GRAY)
+            for y in (-HALF_RAIL_LENGTH, HALF_RAIL_LENGTH)
         ),
         primitive(cart, below, Box(box), BLUE),
-        primitive(cart, axle, Cylinder(0.02, 0.1), DARK),
-        primitive(hinge, middle, Cylinder(RADIUS, LENGTH), ORANGE),
-        primitive(hinge, end, Sphere(2.2 * RADIUS), ORANGE),
+        primitive(cart, axle, Cylinder(0.02, 0.1), DARK_GRAY),
+        primitive(hinge, middle, Cylinder(POLE_RADIUS, POLE_LENGTH), ORANGE),
+        primitive(hinge, end, Sphere(2.2 * POLE_RADIUS), ORANGE),
     )
     return Arm(
         name="cart-pole",

@@ -4,15 +4,15 @@ from collections.abc import Mapping
 
 from labs.models.mechanisms import Mechanism
 
-NAMES: Mapping[str, tuple[str, ...]] = {"cart-pole": ("cart", "pole"), "mass": ("block",)}
+JOINT_NAMES: Mapping[str, tuple[str, ...]] = {"cart-pole": ("cart", "pole"), "mass": ("block",)}
 """Where the parts have names; else they have numbers."""
 
 
-def names_in_sentences(mechanism: Mechanism) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def state_and_control_names(mechanism: Mechanism) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """What each state (nx,) and each control (nu,) is called: "q_2", "the cart's v", "u"."""
     words = coordinate_labels(mechanism)
     q, v, u = (
-        tuple(_called(symbol, name, len(names)) for name in names)
+        tuple(_coordinate_name(symbol, name, len(names)) for name in names)
         for symbol, names in zip(
             "qvu", (words["joint"], words["joint"], words["motor"]), strict=True
         )
@@ -20,7 +20,7 @@ def names_in_sentences(mechanism: Mechanism) -> tuple[tuple[str, ...], tuple[str
     return q + v, u
 
 
-def _called(symbol: str, name: str, of: int) -> str:
+def _coordinate_name(symbol: str, name: str, of: int) -> str:
     if of == 1:
         return symbol
     return f"{symbol}_{name}" if name.isdigit() else f"the {name}'s {symbol}"
@@ -31,12 +31,12 @@ def coordinate_labels(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
     position, of its velocity, and of each motor's control."""
     kinds = [joint.shortname() for joint in list(mechanism.model.joints)[1:]]
     slides = ["JointModelP" in kind for kind in kinds]
-    names = NAMES.get(mechanism.name, tuple(str(i + 1) for i in range(mechanism.nq)))
-    driven = mechanism.driven
+    names = JOINT_NAMES.get(mechanism.name, tuple(str(i + 1) for i in range(mechanism.nq)))
+    driven = mechanism.actuated_joints
     numbered = tuple(str(i + 1) for i in range(len(driven)))
     return {
         "joint": names,
-        "motor": tuple(names[i] for i in driven) if mechanism.name in NAMES else numbered,
+        "motor": tuple(names[i] for i in driven) if mechanism.name in JOINT_NAMES else numbered,
         "q_unit": tuple("m" if slide else "rad" for slide in slides),
         "v_unit": tuple("m/s" if slide else "rad/s" for slide in slides),
         "u_unit": tuple("N" if slides[i] else "N·m" for i in driven),

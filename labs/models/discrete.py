@@ -11,7 +11,7 @@ from labs.models.mechanisms import Mechanism
 
 
 @final
-class Discrete:
+class DiscreteMechanism:
     """x+ = Phi(x, u) with a step of h [s] of `method`, a name of INTEGRATORS."""
 
     def __init__(self, mechanism: Mechanism, h: float, method: str = "semi-implicit-euler") -> None:

@@ -15,11 +15,11 @@ import pinocchio as pin
 
 from labs.algorithms.integrators import Acceleration
 from labs.errors import LabError
-from labs.models.arms import Arm, load
+from labs.models.arms import Arm, load_arm
 from labs.models.cart_pole import cart_pole
 from labs.models.mass_on_a_line import mass_on_a_line
-from labs.models.pendulums import hanging
-from labs.models.plant import Force, Plant, laden
+from labs.models.pendulums import pendulum_arm
+from labs.models.plant import Force, Plant, model_with_payload
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class Mechanism:
 
     name: str
     plant: Plant
-    driven: tuple[int, ...]
+    actuated_joints: tuple[int, ...]
     """Indices of the joints that have a motor."""
     friction: float
 
@@ -56,17 +56,17 @@ class Mechanism:
 
     @property
     def nu(self) -> int:
-        return len(self.driven)
+        return len(self.actuated_joints)
 
     @cached_property
     def S(self) -> np.ndarray:
         """(nv, nu) from controls to joint torques."""
-        return np.eye(self.nq)[:, list(self.driven)]
+        return np.eye(self.nq)[:, list(self.actuated_joints)]
 
     @property
     def control_limit(self) -> np.ndarray:
         """(nu,) [N m; N]: what each motor can give, in either direction."""
-        return self.arm.torque_limit[list(self.driven)]
+        return self.arm.torque_limit[list(self.actuated_joints)]
 
     def acceleration(self, held: np.ndarray, force: Force | None = None) -> Acceleration:
         """a(q, v) under the control `held` (nu,) [N m; N] and a force on the tip. The control is
@@ -75,7 +75,7 @@ class Mechanism:
             return self.plant.acceleration(held, self.friction, force)
         aba, model, data, b, S = pin.aba, self.model, self.data, self.friction, self.S
         if force is not None:
-            pushed = self.plant.torque_of(force)
+            pushed = self.plant.force_to_torque(force)
             return lambda q, v: aba(model, data, q, v, S @ held - b * v + pushed(q))
         return lambda q, v: aba(model, data, q, v, S @ held - b * v)
 
@@ -110,20 +110,20 @@ class Mechanism:
         if self.friction > 0.0:
             f_x[:, n:, n:] -= self.friction * by_tau
         f_u = np.zeros((many, 2 * n, self.nu))
-        f_u[:, n:] = by_tau[:, :, list(self.driven)]
+        f_u[:, n:] = by_tau[:, :, list(self.actuated_joints)]
         return f, f_x, f_u
 
-    def holding(self, q: np.ndarray) -> np.ndarray:
+    def equilibrium_control(self, q: np.ndarray) -> np.ndarray:
         """u (nu,) that keeps q (nq,) at rest: the torques of gravity at the driven joints. Raises
         LabError where gravity moves a joint without a motor."""
         gravity = pin.computeGeneralizedGravity(self.model, self.data, q)
-        free = [i for i in range(self.nq) if i not in self.driven]
+        free = [i for i in range(self.nq) if i not in self.actuated_joints]
         if np.abs(gravity[free]).max(initial=0.0) > 1e-9:
             raise LabError(
                 f"{self.name} cannot rest at q = {np.round(q, 3)}: gravity moves joint "
                 f"{free[int(np.argmax(np.abs(gravity[free])))] + 1}, which has no motor"
             )
-        return np.asarray(gravity[list(self.driven)])
+        return np.asarray(gravity[list(self.actuated_joints)])
 
     def tip(self, q: np.ndarray) -> np.ndarray:
         """Position of the tip (3,) [m]."""
@@ -141,12 +141,12 @@ class Mechanism:
 
 
 MECHANISMS: Mapping[str, tuple[Callable[[], Arm], tuple[int, ...]]] = {
-    "pendulum": (lambda: hanging(1), (0,)),
-    "double-pendulum": (lambda: hanging(2), (0, 1)),
-    "acrobot": (lambda: hanging(2), (1,)),
-    "pendubot": (lambda: hanging(2), (0,)),
+    "pendulum": (lambda: pendulum_arm(1), (0,)),
+    "double-pendulum": (lambda: pendulum_arm(2), (0, 1)),
+    "acrobot": (lambda: pendulum_arm(2), (1,)),
+    "pendubot": (lambda: pendulum_arm(2), (0,)),
     "cart-pole": (cart_pole, (0,)),
-    "ur5": (lambda: load("ur5"), tuple(range(6))),
+    "ur5": (lambda: load_arm("ur5"), tuple(range(6))),
     "mass": (mass_on_a_line, (0,)),
 }
 """By name: what moves, and which joints are driven. The acrobot is the double pendulum driven
@@ -161,5 +161,5 @@ def mechanism(name: str, payload: float = 0.0, friction: float = 0.0) -> Mechani
         raise LabError(f"no mechanism is named {name!r}; there are {', '.join(MECHANISMS)}")
     build, driven = MECHANISMS[name]
     arm = build()
-    model = laden(arm, payload)
+    model = model_with_payload(arm, payload)
     return Mechanism(name, Plant(arm, model, model.createData()), driven, friction)

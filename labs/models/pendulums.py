@@ -18,7 +18,7 @@ from labs.algorithms.runge_kutta import VectorField
 from labs.models.arms import Arm
 from labs.shapes import Box, Cylinder, Sphere, Vector3, primitive, translation
 
-LENGTH, RADIUS, MASS = 0.5, 0.02, 2.0
+ROD_LENGTH, ROD_RADIUS, ROD_MASS = 0.5, 0.02, 2.0
 """Of a rod [m], [m], [kg]."""
 GRAY: Vector3 = (0.36, 0.39, 0.44)
 
@@ -64,10 +64,10 @@ class Pendulum:
         n = len(x) // 2
         kinetic = pin.computeKineticEnergy(self.model, self.data, x[:n], x[n:])
         potential = pin.computePotentialEnergy(self.model, self.data, x[:n])
-        return float(kinetic + potential - self.lowest)
+        return float(kinetic + potential - self.rest_potential_energy)
 
     @cached_property
-    def lowest(self) -> float:
+    def rest_potential_energy(self) -> float:
         """Potential energy [J] at rest at x = 0, by Pinocchio's zero."""
         return float(pin.computePotentialEnergy(self.model, self.data, np.zeros(self.model.nv)))
 
@@ -81,24 +81,26 @@ class Pendulum:
 @cache
 def pendulum(rods: int, friction: float = 0.0) -> Pendulum:
     """A pendulum of this many rods."""
-    model = hanging(rods).model
+    model = pendulum_arm(rods).model
     return Pendulum(model, model.createData(), friction)
 
 
 @cache
-def hanging(rods: int, place: tuple[float, float] = (0.0, 0.0), color: Vector3 = GRAY) -> Arm:
+def pendulum_arm(rods: int, place: tuple[float, float] = (0.0, 0.0), color: Vector3 = GRAY) -> Arm:
     """The same as a robot to draw, hung up at (*place, 0.25 + rods L) [m]."""
     model = pin.Model()
     model.name = f"pendulum{rods}"
-    middle = translation(0.0, 0.0, -LENGTH / 2)
-    parent, hinge = 0, translation(*place, 0.25 + rods * LENGTH)
+    middle = translation(0.0, 0.0, -ROD_LENGTH / 2)
+    parent, hinge = 0, translation(*place, 0.25 + rods * ROD_LENGTH)
     visuals = [primitive(0, hinge, Box((0.05, 0.07, 0.05)), GRAY)]
     for rod in range(rods):
         parent = model.addJoint(parent, pin.JointModelRX(), hinge, f"hinge{rod + 1}")
-        model.appendBodyToJoint(parent, pin.Inertia.FromCylinder(MASS, RADIUS, LENGTH), middle)
-        visuals.append(primitive(parent, middle, Cylinder(RADIUS, LENGTH), color))
-        hinge = translation(0.0, 0.0, -LENGTH)
-        visuals.append(primitive(parent, hinge, Sphere(2.2 * RADIUS), color))
+        model.appendBodyToJoint(
+            parent, pin.Inertia.FromCylinder(ROD_MASS, ROD_RADIUS, ROD_LENGTH), middle
+        )
+        visuals.append(primitive(parent, middle, Cylinder(ROD_RADIUS, ROD_LENGTH), color))
+        hinge = translation(0.0, 0.0, -ROD_LENGTH)
+        visuals.append(primitive(parent, hinge, Sphere(2.2 * ROD_RADIUS), color))
     tip = model.addFrame(pin.Frame("tip", parent, hinge, pin.FrameType.OP_FRAME))
     return Arm(
         name=model.name,

@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from labs.algorithms.integrators import Acceleration
-from labs.models.arms import Arm, load
+from labs.models.arms import Arm, load_arm
 
 Force = Callable[[np.ndarray], np.ndarray]
 """The tip's position (3,) [m] to the force on it (3,) [N]."""
@@ -38,7 +38,7 @@ class Plant:
         holds the array may write the next torque into it."""
         aba, model, data = pin.aba, self.model, self.data
         if force is not None:
-            pushed = self.torque_of(force)
+            pushed = self.force_to_torque(force)
             return lambda q, v: aba(model, data, q, v, held - friction * v + pushed(q))
         if friction > 0.0:
             drag = np.full(model.nv, friction)
@@ -65,7 +65,7 @@ class Plant:
         kinetic = pin.computeKineticEnergy(self.model, self.data, q, v)
         return float(kinetic), float(pin.computePotentialEnergy(self.model, self.data, q))
 
-    def torque_of(self, force: Force) -> Callable[[np.ndarray], np.ndarray]:
+    def force_to_torque(self, force: Force) -> Callable[[np.ndarray], np.ndarray]:
         """q to J(q)^T f (nv,): the force as a torque [N m; N]."""
 
         def torque(q: np.ndarray) -> np.ndarray:
@@ -78,12 +78,12 @@ class Plant:
 @lru_cache(maxsize=16)
 def plant(robot: str, payload: float = 0.0) -> Plant:
     """The arm of this name carrying `payload` [kg] at its end-effector."""
-    arm = load(robot)
-    model = laden(arm, payload)
+    arm = load_arm(robot)
+    model = model_with_payload(arm, payload)
     return Plant(arm, model, model.createData())
 
 
-def laden(arm: Arm, payload: float) -> pin.Model:
+def model_with_payload(arm: Arm, payload: float) -> pin.Model:
     """The arm's model with a point mass [kg] at its tip."""
     model = arm.model.copy()
     if payload > 0.0:

@@ -49,7 +49,7 @@ def two_link(model: pin.Model) -> TwoLink:
     inertia = [0.5 * (ahead[0, 0] + back[0, 0]), b, ahead[1, 1], ahead[0, 1] - b, across[0, 1] - b]
     Q = sample_postures()
     g = np.array([pin.computeGeneralizedGravity(model, data, q) for q in Q])
-    gravity = np.linalg.lstsq(directions(Q), g, rcond=None)[0].T
+    gravity = np.linalg.lstsq(joint_direction_features(Q), g, rcond=None)[0].T
     return TwoLink(2, np.array(inertia), np.ascontiguousarray(gravity))
 
 
@@ -59,14 +59,14 @@ def sample_postures() -> np.ndarray:
     return np.stack(np.meshgrid(turns, turns), axis=-1).reshape(-1, 2)
 
 
-def directions(Q: np.ndarray) -> np.ndarray:
+def joint_direction_features(Q: np.ndarray) -> np.ndarray:
     """(k, 4): cos q1, sin q1, cos(q1 + q2), sin(q1 + q2) of Q (k, 2)."""
     first, both = Q[:, 0], Q[:, 0] + Q[:, 1]
     return np.stack([np.cos(first), np.sin(first), np.cos(both), np.sin(both)], axis=1)
 
 
 @compiled
-def simulate(
+def simulate_two_link(
     joints: int, inertia: np.ndarray, gravity: np.ndarray, X: np.ndarray,
     torques: np.ndarray, limits: np.ndarray, h: float, substeps: int,
 ) -> np.ndarray:  # fmt: skip

@@ -37,7 +37,7 @@ class Environment(Protocol):
         """Into how many parts a step is divided, to be seen one by one."""
         ...
 
-    def starts(self, random: np.ndarray, many: int) -> np.ndarray:
+    def initial_states(self, random: np.ndarray, many: int) -> np.ndarray:
         """States (many, nx) that episodes begin in, drawn by `random` (4,) uint64, a state of
         `labs.random_numbers` that is advanced."""
         ...
@@ -47,7 +47,7 @@ class Environment(Protocol):
         one."""
         ...
 
-    def advance(self, X: np.ndarray, U: np.ndarray) -> np.ndarray:
+    def substep(self, X: np.ndarray, U: np.ndarray) -> np.ndarray:
         """X (k, nx) one part of a step later, under the controls of indices U (k,)."""
         ...
 

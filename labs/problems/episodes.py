@@ -17,7 +17,7 @@ import numpy as np
 
 from labs.compiled import compiled, inlined
 from labs.problems.finite_mdp import FiniteMDP
-from labs.random_numbers import below, uniform
+from labs.random_numbers import random_integer, uniform
 
 NO_OUTCOMES = np.zeros((0, 0, 0), np.int32)
 
@@ -97,7 +97,7 @@ def episodic_task(mdp: FiniteMDP, starts: Sequence[int], horizon: int) -> Episod
 def initial_state(task: EpisodicTask, random: np.ndarray) -> int:
     """A state to start from, drawn evenly."""
     many = len(task.starts)
-    return int(task.starts[0 if many == 1 else below(random, many)])
+    return int(task.starts[0 if many == 1 else random_integer(random, many)])
 
 
 @compiled
@@ -105,17 +105,17 @@ def transition(task: EpisodicTask, x: int, u: int, random: np.ndarray) -> int:
     """The next state."""
     if task.successor.size:
         return int(task.successor[x, u])
-    return _sample(task, x, u, random)
+    return _sample_transition(task, x, u, random)
 
 
 @compiled
-def _sample(task: EpisodicTask, x: int, u: int, random: np.ndarray) -> int:
+def _sample_transition(task: EpisodicTask, x: int, u: int, random: np.ndarray) -> int:
     k = np.searchsorted(task.cumulative[u, x], uniform(random), "right")
     return int(task.outcomes[u, x, k]) if task.outcomes.size else int(k)
 
 
 @inlined
-def record(
+def record_step(
     task: EpisodicTask, learner: Learner, episode: int, x: int, u: int, discount: float
 ) -> float:
     """Adds what (x, u) costs to an episode; the discount of the cost after it."""

@@ -105,7 +105,7 @@ class FiniteMDP:
             raise LabError("this MDP leaves the next state to chance: it has no successor table")
         return self.successor
 
-    def expect(self, V: np.ndarray) -> np.ndarray:
+    def expected_value(self, V: np.ndarray) -> np.ndarray:
         """(X, U): E[V(x') | x, u], V (X,) finite."""
         if self.successor is not None:
             return np.asarray(V[self.successor])
@@ -181,12 +181,12 @@ class FiniteMDP:
         """(X,) bool: from where some controls may lead to a terminal state."""
         found: np.ndarray = self.terminal.copy()
         while True:
-            leads = (self.expect(found.astype(float)) > 0.0).any(axis=1)
+            leads = (self.expected_value(found.astype(float)) > 0.0).any(axis=1)
             if not (leads & ~found).any():
                 return found
             found |= leads
 
-    def report(self, starts: Iterable[int]) -> str:
+    def describe(self, starts: Iterable[int]) -> str:
         """In words: its size, its terminal states, and what cannot be reached from `starts`."""
         lost = int((~self.reachable(starts)).sum())
         return (

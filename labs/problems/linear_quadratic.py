@@ -71,7 +71,7 @@ class LqrProblem:
             check_weight("Q", terms["q"])
         else:
             q, s, r = terms["q"], terms["s"], terms["r"]
-            check_weight("[Q S; S' R]", _blocks([[q, s], [s.transpose(0, 2, 1), r]]))
+            check_weight("[Q S; S' R]", _block_matrices([[q, s], [s.transpose(0, 2, 1), r]]))
         check_weight("Q_f", terms["q_final"])
 
     @property
@@ -107,12 +107,12 @@ class LqrProblem:
         constant = terms["constant"][:, None, None]
         final = [row["q_final_linear"], self.constant_final * one]
         return {
-            "a": _blocks([[terms["a"], column["c"]], [np.zeros((1, 1, self.n)), one]]),
-            "b": _blocks([[terms["b"]], [np.zeros((1, 1, self.m))]]),
-            "q": _blocks([[terms["q"], column["q_linear"]], [row["q_linear"], constant]]),
+            "a": _block_matrices([[terms["a"], column["c"]], [np.zeros((1, 1, self.n)), one]]),
+            "b": _block_matrices([[terms["b"]], [np.zeros((1, 1, self.m))]]),
+            "q": _block_matrices([[terms["q"], column["q_linear"]], [row["q_linear"], constant]]),
             "r": terms["r"],
-            "s": _blocks([[terms["s"]], [row["s_linear"]]]),
-            "q_final": _blocks([[terms["q_final"], column["q_final_linear"]], final]),
+            "s": _block_matrices([[terms["s"]], [row["s_linear"]]]),
+            "q_final": _block_matrices([[terms["q_final"], column["q_final_linear"]], final]),
         }
 
     def cost(self, x: np.ndarray, u: np.ndarray) -> float:
@@ -129,7 +129,7 @@ class LqrProblem:
         last = end @ terms["q_final"][0] @ end + 2.0 * terms["q_final_linear"][0] @ end
         return float(stage.sum() + last + self.constant_final)
 
-    def follow(self, policy: "LqrPolicy", x0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def rollout(self, policy: "LqrPolicy", x0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """x (N + 1, n) and u (N, m) from x0 (n,) under the policy."""
         a, b, c = (_broadcast(self.terms[name], self.horizon) for name in "abc")
         x, u = np.zeros((self.horizon + 1, self.n)), np.zeros((self.horizon, self.m))
@@ -179,7 +179,7 @@ class LqrPolicy:
         return float(quadratic + 2.0 * self.linear[t] @ x + self.constants[t])
 
 
-def tracking(
+def tracking_problem(
     horizon: int,
     dynamics: tuple[np.ndarray, np.ndarray, np.ndarray | None],
     weights: tuple[np.ndarray, np.ndarray, np.ndarray],
@@ -241,13 +241,13 @@ def check_weight(name: str, stack: np.ndarray, definite: bool = False) -> None:
     least, size = np.linalg.eigvalsh(scaled)[:, 0], np.abs(scaled).max(axis=(1, 2))
     if definite and (least <= 0.0).any():
         raise LabError(
-            f"{name} has an eigenvalue {_least(stack):.3g}: it takes a positive definite matrix, "
-            "all eigenvalues above zero"
+            f"{name} has an eigenvalue {_least_eigenvalue(stack):.3g}: it takes a positive "
+            "definite matrix, all eigenvalues above zero"
         )
     if (least < -NEGLIGIBLE * size).any():
         raise LabError(
-            f"{name} has an eigenvalue {_least(stack):.3g}: it takes a positive semidefinite "
-            "matrix, no eigenvalue below zero"
+            f"{name} has an eigenvalue {_least_eigenvalue(stack):.3g}: it takes a positive "
+            "semidefinite matrix, no eigenvalue below zero"
         )
 
 
@@ -269,7 +269,7 @@ def weight_roots(stack: np.ndarray) -> np.ndarray:
     return roots
 
 
-def _least(stack: np.ndarray) -> float:
+def _least_eigenvalue(stack: np.ndarray) -> float:
     """The least eigenvalue."""
     return float(np.linalg.eigvalsh(stack).min())
 
@@ -279,7 +279,7 @@ def _broadcast(stack: np.ndarray, horizon: int) -> np.ndarray:
     return np.broadcast_to(stack, (horizon, *stack.shape[1:]))
 
 
-def _blocks(rows: Sequence[Sequence[np.ndarray]]) -> np.ndarray:
+def _block_matrices(rows: Sequence[Sequence[np.ndarray]]) -> np.ndarray:
     """Stacks of matrices (k or 1, ., .) put together as the blocks of larger ones."""
     steps = max(len(part) for row in rows for part in row)
     joined = [np.concatenate([_broadcast(part, steps) for part in row], axis=2) for row in rows]

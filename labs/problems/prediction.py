@@ -21,7 +21,7 @@ from labs.compiled import compiled, inlined
 from labs.errors import LabError
 from labs.problems.episodes import EpisodicTask, episodic_task, initial_state, transition
 from labs.problems.finite_mdp import FiniteMDP, cumulative_sums
-from labs.random_numbers import below, uniform
+from labs.random_numbers import random_integer, uniform
 
 
 class PredictionTask(NamedTuple):
@@ -77,7 +77,7 @@ def prediction_task(
         raise LabError(f"truth and weight have a finite number for each of {mdp.X} states")
     return PredictionTask(
         task=episodic_task(mdp, starts, horizon),
-        choices=_cumulative(followed),
+        choices=_cumulative_policy(followed),
         ratio=ratio,
         truth=np.ascontiguousarray(truth, float),
         weight=weight / weight.sum(),
@@ -102,7 +102,7 @@ def sample_episode(task: PredictionTask, random: np.ndarray, episode: Episode) -
     x, t = initial_state(inner, random), 0
     episode.states[0] = x
     while t < inner.horizon and not inner.terminal[x]:
-        u = _choose(task.choices, x, random)
+        u = _sample_control(task.choices, x, random)
         episode.controls[t], episode.costs[t] = u, inner.cost[x, u]
         x, t = transition(inner, x, u, random), t + 1
         episode.states[t] = x
@@ -112,15 +112,15 @@ def sample_episode(task: PredictionTask, random: np.ndarray, episode: Episode) -
 @compiled
 def sample_step(task: PredictionTask, x: int, random: np.ndarray) -> tuple[int, int]:
     """A control of the policy in state x, and the next state, as in an episode."""
-    u = _choose(task.choices, x, random)
+    u = _sample_control(task.choices, x, random)
     return u, transition(task.task, x, u, random)
 
 
 @inlined
-def _choose(choices: np.ndarray, x: int, random: np.ndarray) -> int:
+def _sample_control(choices: np.ndarray, x: int, random: np.ndarray) -> int:
     controls = choices.shape[1]
     if len(choices) == 0:
-        return below(random, controls)
+        return random_integer(random, controls)
     drawn = uniform(random)
     if controls > 8:
         return int(np.searchsorted(choices[x], drawn, "right"))
@@ -131,7 +131,7 @@ def _choose(choices: np.ndarray, x: int, random: np.ndarray) -> int:
 
 
 @inlined
-def importance(task: PredictionTask, x: int, u: int) -> float:
+def importance_ratio(task: PredictionTask, x: int, u: int) -> float:
     """rho of a transition."""
     return float(task.ratio[x, u]) if task.ratio.size else 1.0
 
@@ -161,7 +161,7 @@ def _probabilities(mdp: FiniteMDP, policy: np.ndarray) -> np.ndarray:
     return policy
 
 
-def _cumulative(probabilities: np.ndarray) -> np.ndarray:
+def _cumulative_policy(probabilities: np.ndarray) -> np.ndarray:
     if (probabilities == 1.0 / probabilities.shape[1]).all():
         return np.zeros((0, probabilities.shape[1]))
     return cumulative_sums(probabilities)

@@ -30,10 +30,10 @@ MEASURES = {
     "direct": direct.beside_ipopt,
     "direct-iteration": direct.on_the_ur5,
     "direct-drag": drag.target_to_motion,
-    "mpc": mpc.everything,
+    "mpc": mpc.mpc_benchmarks,
     "value-iteration": dynamic_programming.on_the_pendulum,
     "q-learning": td_control.q_learning_steps,
-    "rl": rl.everything,
+    "rl": rl.rl_benchmarks,
     "slider": latency.slider_to_telemetry,
     "scene": latency.slider_to_scene,
     "knob": knob.knob_to_telemetry,
@@ -41,8 +41,8 @@ MEASURES = {
     "resolve": resolve.weight_to_motion,
     "frames": frames.while_solving,
     "page": latency.page_to_motion,
-    "twelve": load.twelve,
-    "growing": load.growing,
+    "twelve": load.twelve_sessions,
+    "growing": load.step_time_by_sessions,
 }
 
 

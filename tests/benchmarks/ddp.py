@@ -9,7 +9,7 @@ import pinocchio as pin
 
 from labs.algorithms import ddp
 from labs.algorithms.ddp import DdpIterate, DdpOptions
-from labs.models.discrete import Discrete
+from labs.models.discrete import DiscreteMechanism
 from labs.models.mechanisms import Mechanism, mechanism
 from labs.models.plant import Plant
 from labs.problems.optimal_control import OptimalControlProblem
@@ -23,11 +23,11 @@ def reach(m: Mechanism, N: int, h: float = 0.01) -> tuple[OptimalControlProblem,
     """An arm's tip to a point in N steps, and a first guess: gravity compensation."""
     n = m.nq
     q = np.resize(m.arm.home, n)
-    holding, nothing = m.holding(q), np.zeros(2 * n)
+    holding, nothing = m.equilibrium_control(q), np.zeros(2 * n)
     weights = [np.diag([x] * n + [y] * n) for x, y in ((0.0, 0.01 * h), (0.0, 10.0))]
     goal = TipCost(m, m.tip(q) + np.array([-0.1, 0.3, 0.1]), 1000.0)
     cost = MotionCost(N, weights[0], 1e-4 * h * np.eye(n), weights[1], nothing, holding, goal)
-    return OptimalControlProblem(Discrete(m, h), cost, np.r_[q, np.zeros(n)], N), np.tile(
+    return OptimalControlProblem(DiscreteMechanism(m, h), cost, np.r_[q, np.zeros(n)], N), np.tile(
         holding, (N, 1)
     )
 

@@ -18,7 +18,7 @@ from labs.problems.continuous_control import ContinuousProblem
 from labs.tasks.motion.continuous import MotionLimits, continuous_motion
 from tests.benchmarks.timing import ROUNDS, bare_calls
 from tests.labs.algorithms.collocation_oracle import ipopt
-from tests.labs.algorithms.transcriptions import straight
+from tests.labs.algorithms.transcriptions import straight_guess
 
 N = 100
 SCHEME = "trapezoidal"
@@ -45,7 +45,7 @@ def beside_ipopt() -> None:
     ratios = []
     for name, objective, T, limit in CASES:
         problem = continuous_motion(name, objective, T, limits=MotionLimits(control=limit))
-        guess = straight(problem, N)
+        guess = straight_guess(problem, N)
         theirs = ipopt(problem, N, SCHEME, guess.X, guess.U)
         program = Collocation(problem, N, SCHEME)
         y = program.variables(guess.X, guess.U)
@@ -83,10 +83,10 @@ def iteration(program: Collocation, at: SqpIterate) -> tuple[dict[str, float], f
     return {phase: min(f.seconds[phase] for f in found) for phase in PHASES}, min(times)
 
 
-def second(steps: int) -> tuple[Collocation, SqpIterate]:
+def second_program(steps: int) -> tuple[Collocation, SqpIterate]:
     """The programme, where its second iteration begins."""
     problem = reach(steps)
-    program, guess = Collocation(problem, steps, SCHEME), straight(problem, steps)
+    program, guess = Collocation(problem, steps, SCHEME), straight_guess(problem, steps)
     at = sqp.init(program, program.variables(guess.X, guess.U), GAUSS_NEWTON)
     return program, sqp.step(program, GAUSS_NEWTON, at)
 
@@ -97,7 +97,7 @@ def on_the_ur5() -> None:
     ur5 = mechanism("ur5")
     calls = bare_calls(ur5, N + 1)
     print(f"{N + 1} aba + computeABADerivatives {calls * 1e3:7.2f} ms    1.00")
-    program, at = second(N)
+    program, at = second_program(N)
     for name in ("second", "late"):
         phases, whole = iteration(program, at)
         for phase, spent in phases.items():
@@ -105,7 +105,7 @@ def on_the_ur5() -> None:
         print(f"the {name} iteration {whole * 1e3:24.2f} ms {whole / calls:7.2f}")
         while at.optimality and at.optimality.residual > LATE:
             at = sqp.step(program, GAUSS_NEWTON, at)
-    _, at = second(N)
+    _, at = second_program(N)
     ratios = []
     while not at.stopped:
         ratios.append(iteration(program, at)[1] / calls)
@@ -114,6 +114,6 @@ def on_the_ur5() -> None:
     print(f"{int((at.nu != 0.0).sum())} bounds active at the solution")
     print("    N      ms   us a step   of the bare calls")
     for steps in (25, 50, 100, 200, 400):
-        _, whole = iteration(*second(steps))
+        _, whole = iteration(*second_program(steps))
         ratio = whole / bare_calls(ur5, steps + 1)
         print(f"{steps:5} {whole * 1e3:7.2f} {whole / steps * 1e6:11.1f} {ratio:19.2f}")

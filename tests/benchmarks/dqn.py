@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from labs.algorithms import dqn
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
-from labs.models.two_link import simulate
+from labs.models.two_link import simulate_two_link
 from labs.params import Value
 from labs.random_numbers import uniform
 from labs.reinforcement_learning.dqn.controllers import mean_cost, network_controller
@@ -33,7 +33,7 @@ class GymnasiumPendulum:
     torques = np.linspace(-2.0, 2.0, 5)
     horizon, nx, observation_size, control_count, substeps = 200, 2, 3, 5, 1
 
-    def starts(self, random: np.ndarray, many: int) -> np.ndarray:
+    def initial_states(self, random: np.ndarray, many: int) -> np.ndarray:
         drawn = np.array([[uniform(random), uniform(random)] for _ in range(many)])
         return np.asarray((2.0 * drawn - 1.0) * [np.pi, 1.0])
 
@@ -41,28 +41,28 @@ class GymnasiumPendulum:
         parts = [np.cos(X[:, 0]), np.sin(X[:, 0]), X[:, 1] / 8.0]
         return np.stack(parts, axis=1).astype(np.float32)
 
-    def advance(self, X: np.ndarray, U: np.ndarray) -> np.ndarray:
+    def substep(self, X: np.ndarray, U: np.ndarray) -> np.ndarray:
         inertia, gravity = np.array([1 / 3, 0.0, 1.0, 0.0, 0.0]), np.zeros((2, 4))
         gravity[0, 1] = -5.0  # m g l / 2
         tau = self.torques[U][:, None]
-        return simulate(1, inertia, gravity, X, tau, np.array([8.0]), 0.05, 1)
+        return simulate_two_link(1, inertia, gravity, X, tau, np.array([8.0]), 0.05, 1)
 
     def step(self, X: np.ndarray, U: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         angle = np.remainder(X[:, 0] + np.pi, 2 * np.pi) - np.pi
         costs = angle**2 + 0.1 * X[:, 1] ** 2 + 0.001 * self.torques[U] ** 2
-        return self.advance(X, U), costs, np.zeros(len(X), bool)
+        return self.substep(X, U), costs, np.zeros(len(X), bool)
 
 
 def training() -> None:
     """The pendulum, of Gymnasium and of the lab: 100 fixed starts cost 170 on average, or less,
     within 5 s for 9 of 10 seeds at least. The others within 120 s. And the longest piece of work
     between two frames of the scene."""
-    find("dqn").lab.prepare()
-    _told("Gymnasium's pendulum", [_gymnasium(seed) for seed in range(PENDULUM_SEEDS)], 5.0)
+    find_lab("dqn").lab.prepare()
+    _report("Gymnasium's pendulum", [_gymnasium(seed) for seed in range(PENDULUM_SEEDS)], 5.0)
     found = [_lab("Pendulum", 170.0, seed) for seed in range(PENDULUM_SEEDS)]
-    _told("pendulum", found, 5.0)
+    _report("pendulum", found, 5.0)
     for preset, (_, cost, seconds) in GOALS.items():
-        _told(preset, [_lab(preset, cost, seed) for seed in range(OTHER_SEEDS)], seconds)
+        _report(preset, [_lab(preset, cost, seed) for seed in range(OTHER_SEEDS)], seconds)
     for preset in ("Pendulum", *GOALS):
         pieces = _pieces(preset)
         print(
@@ -71,7 +71,7 @@ def training() -> None:
         )
 
 
-def _told(name: str, found: list[tuple[float, int, float]], limit: float) -> None:
+def _report(name: str, found: list[tuple[float, int, float]], limit: float) -> None:
     """`found`: seconds, steps and cost of each seed; no seconds where it was not learned."""
     seconds = [s for s, _, _ in found]
     print(
@@ -84,7 +84,7 @@ def _told(name: str, found: list[tuple[float, int, float]], limit: float) -> Non
 
 def _gymnasium(seed: int) -> tuple[float, int, float]:
     environment, options = GymnasiumPendulum(), dqn.DqnOptions(cost_scale=10.0)
-    X = environment.starts(RANDOM.copy(), STARTS)
+    X = environment.initial_states(RANDOM.copy(), STARTS)
     agent = dqn.init(environment, (64, 64), np.random.default_rng(seed), capacity=20_000)
     seconds = 0.0
     for _ in range(60):
@@ -98,11 +98,11 @@ def _gymnasium(seed: int) -> tuple[float, int, float]:
 
 
 def _lab(preset: str, goal: float, seed: int) -> tuple[float, int, float]:
-    entry = find("dqn")
+    entry = find_lab("dqn")
     setting: Mapping[str, Value] = {**entry.lab.presets[preset], "steps": 200_000.0}
     world = World(entry, setting, seed)
     task, seconds, tried = learning_task(str(setting.get("system", "pendulum"))), 0.0, -1.0
-    X = task.robot.starts(RANDOM.copy(), STARTS)
+    X = task.robot.initial_states(RANDOM.copy(), STARTS)
     while world.solving:
         begin = time.process_time()
         world.iterate()
@@ -120,7 +120,7 @@ def _lab(preset: str, goal: float, seed: int) -> tuple[float, int, float]:
 
 def _pieces(preset: str) -> list[float]:
     """[s] from each pause of a training to the next."""
-    entry = find("dqn")
+    entry = find_lab("dqn")
     world, pieces = World(entry, {**entry.lab.presets[preset], "steps": 8000.0}), []
     work = world.lab.solve(world.params, world.state)
     begin = time.perf_counter()

@@ -8,13 +8,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.params import Value
-from labs.tasks.direct.picture import joined
+from labs.tasks.direct.picture import join_pieces
 from labs.tasks.direct.player import DirectState
 from tests.labs.solving import solve_to_convergence
-from tests.served import Served
+from tests.server_process import ServerProcess
 from tests.viser_client import SceneClient, message
 
 MOVES = 30
@@ -29,17 +29,17 @@ def target_to_motion() -> None:
     """From a drag's message, over all iterations of the new solve, to the scene message with the
     path of the UR5's new motion: the same, bit for bit, as a world beside it finds from the same
     changes. At most 300 ms (median), with 30 scene messages a second in every solve."""
-    twin = World(find(LAB), REACH)
+    twin = World(find_lab(LAB), REACH)
     solve_to_convergence(twin)
     with (
-        Served() as server,
+        ServerProcess() as server,
         server.session(LAB, params=dict(REACH)) as session,
         SceneClient(session) as scene,
     ):
         with session.stream() as stream:
             stream.next("status", lambda s: s["solver"]["done"])
         scene.wait_for_node("/target")
-        scene.skip(1.0)
+        scene.read_for(1.0)
         scene.socket.send(_drag("start", START))
         times, rates, iterations = [], [], []
         for k in range(1, MOVES + 1):
@@ -48,7 +48,7 @@ def target_to_motion() -> None:
             twin.change(twin.lab.edit(twin.params, "target", place))
             iterations.append(solve_to_convergence(twin))
             path = _on_the_wire(twin)
-            scene.skip(0.3 + 0.001 * (k % 37))  # not in step with the frames
+            scene.read_for(0.3 + 0.001 * (k % 37))  # not in step with the frames
             begin, frames = time.perf_counter(), 0
             scene.socket.send(_drag("update", place))
             while path not in _window(scene):
@@ -76,7 +76,7 @@ def _window(scene: SceneClient) -> bytes:
 def _on_the_wire(world: World) -> bytes:
     """The path of the plan's tip, as the scene sends it."""
     assert isinstance(world.state, DirectState)
-    (path,) = joined(world.state.history.tips[-1])
+    (path,) = join_pieces(world.state.history.tips[-1])
     return np.stack([path[:-1], path[1:]], axis=1).astype(np.float32).tobytes()
 
 

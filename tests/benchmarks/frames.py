@@ -5,10 +5,10 @@ import time
 from collections.abc import Mapping
 
 from labs.params import Value
-from tests.served import Served
+from tests.server_process import ServerProcess
 from tests.viser_client import SceneClient
 
-WORK: Mapping[str, tuple[str, Mapping[str, Value]]] = {
+SOLVES: Mapping[str, tuple[str, Mapping[str, Value]]] = {
     "deep Q-learning, pendulum, 3 learners": ("dqn", {"learners": 3.0, "steps": 100000.0}),
     "deep Q-learning, double pendulum": ("dqn", {"system": "double-pendulum", "width": 128.0}),
     "Q-learning and SARSA, pendulum": ("td-control", {"system": "pendulum", "episodes": 2000.0}),
@@ -25,19 +25,21 @@ WORK: Mapping[str, tuple[str, Mapping[str, Value]]] = {
 def while_solving() -> None:
     """Windows of scene messages a second from a reset until the solver is done."""
     print("                                   solved in   scene, mean   slowest half second")
-    with Served() as server:
-        for name, (lab, params) in WORK.items():
-            times, seconds = _arrivals(server, lab, params)
+    with ServerProcess() as server:
+        for name, (lab, params) in SOLVES.items():
+            times, seconds = _arrival_times(server, lab, params)
             rate, worst = _rates(times)
             print(f"{name:34} {seconds:7.2f} s {rate:11.1f}/s {worst:16.1f}/s")
 
 
-def _arrivals(server: Served, lab: str, params: Mapping[str, Value]) -> tuple[list[float], float]:
+def _arrival_times(
+    server: ServerProcess, lab: str, params: Mapping[str, Value]
+) -> tuple[list[float], float]:
     """When windows of the scene came, from a reset until the solver was done; and that time."""
     with server.session(lab, params=dict(params)) as session, SceneClient(session) as scene:
         with session.stream() as stream:
             stream.next("status", lambda s: s["solver"]["done"])
-        scene.skip(1.0)
+        scene.read_for(1.0)
         times: list[float] = []
         done = threading.Event()
 

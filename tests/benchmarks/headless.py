@@ -6,7 +6,7 @@ import time
 import numpy as np
 import pinocchio as pin
 
-from labs.engine.headless import run
+from labs.engine.headless import run_headless
 from labs.models.arms import ur5
 
 SECONDS = 1.0
@@ -17,7 +17,7 @@ def ratio_to_bare_calls() -> None:
     """UR5, PD with gravity compensation at 1 kHz, semi-implicit Euler at 1 ms, in CPU time: one
     call of aba and one of computeGeneralizedGravity a step are what it cannot do without."""
     steps = round(SECONDS / 1e-3)
-    run("joint-control", seconds=0.5)  # loads the robot
+    run_headless("joint-control", seconds=0.5)  # loads the robot
     bare, whole = [], []
     for _ in range(ROUNDS):
         bare.append(_bare(steps))
@@ -45,5 +45,5 @@ def _bare(steps: int) -> float:
 
 def _whole() -> float:
     begin = time.process_time()
-    run("joint-control", {"controller": "pd-gravity"}, seconds=SECONDS)
+    run_headless("joint-control", {"controller": "pd-gravity"}, seconds=SECONDS)
     return time.process_time() - begin

@@ -14,7 +14,7 @@ from websockets.sync.connection import Connection
 
 from tests import chromium
 from tests.browser.lab_page import LabPage
-from tests.served import Opened, Served
+from tests.server_process import ServerProcess, SessionClient
 from tests.viser_client import SceneClient
 
 TRIES = 100
@@ -63,7 +63,7 @@ TURN_LATER = """([name, position]) => setTimeout(() => {
 def knob_to_telemetry() -> None:
     """joint-control's amplitude is turned, and shows in the reference."""
     params = {"reference": "set-point", "amplitude": 0.2}
-    with Served() as server, _chromium(server) as open_page:
+    with ServerProcess() as server, _chromium(server) as open_page:
         with server.session("joint-control", params=params) as session:
             _report("bare client, knob to telemetry", _bare_telemetry(session))
         for scene in (False, True):
@@ -79,15 +79,15 @@ def knob_to_telemetry() -> None:
 
 def knob_to_scene() -> None:
     """kinematics' first joint is turned where nothing else moves; a second viewer looks on."""
-    with Served() as server, _chromium(server) as open_page:
+    with ServerProcess() as server, _chromium(server) as open_page:
         with server.session("kinematics") as session:
             _report("bare client, knob to scene", _bare_scene(session))
         page = open_page()
         lab = LabPage(page, scene=False).open("kinematics")
         times = []
-        with SceneClient(Opened(server, lab.status())) as onlooker:
+        with SceneClient(SessionClient(server, lab.status())) as onlooker:
             for k in range(TRIES):
-                onlooker.skip(PAUSE)
+                onlooker.read_for(PAUSE)
                 page.evaluate(TURN_LATER, ["q1", 0.4 + 0.1 * (k % 2)])
                 onlooker.read_until(_turns_first_joint)
                 seen = 1e3 * time.time()
@@ -96,8 +96,8 @@ def knob_to_scene() -> None:
 
 
 @contextlib.contextmanager
-def _chromium(server: Served) -> Iterator[Callable[[], Page]]:
-    path = chromium.find()
+def _chromium(server: ServerProcess) -> Iterator[Callable[[], Page]]:
+    path = chromium.find_browser()
     assert path, "needs a Chromium"
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=chromium.ARGUMENTS)
@@ -109,7 +109,7 @@ def _chromium(server: Served) -> Iterator[Callable[[], Page]]:
         browser.close()
 
 
-def _bare_telemetry(session: Opened) -> list[float]:
+def _bare_telemetry(session: SessionClient) -> list[float]:
     times = []
     with session.stream() as stream:
         reference = stream.next("hello")["columns"].index("q_ref[0]")
@@ -129,11 +129,11 @@ def _moved(rows: list[list[float]], column: int, before: float) -> bool:
     return any(abs(row[column] - before) > 1e-3 for row in rows)
 
 
-def _bare_scene(session: Opened) -> list[float]:
+def _bare_scene(session: SessionClient) -> list[float]:
     times = []
     with session.stream() as stream, SceneClient(session) as scene:
         for k in range(TRIES):
-            scene.skip(PAUSE + 0.001 * (k % 37))
+            scene.read_for(PAUSE + 0.001 * (k % 37))
             begin = time.perf_counter()
             _set(stream.socket, q1=0.5 if k % 2 else -0.5)
             scene.read_until(_turns_first_joint)

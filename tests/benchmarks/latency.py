@@ -10,8 +10,8 @@ from typing import Any
 
 from websockets.exceptions import ConnectionClosed
 
-from labs.engine.catalog import find
-from tests.served import Opened, Served
+from labs.engine.catalog import find_lab
+from tests.server_process import ServerProcess, SessionClient
 from tests.viser_client import SceneClient
 
 TRIES = 150
@@ -22,7 +22,7 @@ def slider_to_telemetry() -> None:
     amplitude of a set point is moved, and shows in the reference."""
     params = {"reference": "set-point", "amplitude": 0.2}
     with (
-        Served() as server,
+        ServerProcess() as server,
         server.session("joint-control", params=params) as session,
         SceneClient(session) as scene,
     ):
@@ -33,7 +33,7 @@ def slider_to_telemetry() -> None:
     )
 
 
-def _moves(session: Opened, scene: SceneClient) -> list[float]:
+def _moves(session: SessionClient, scene: SceneClient) -> list[float]:
     label = next(label for label in _labels(scene) if "mplitude" in label)
     heard: Queue[tuple[float, float]] = Queue()
     with session.stream() as stream:
@@ -79,15 +79,15 @@ def slider_to_scene() -> None:
     """From a joint slider's message to the scene message that turns the joint, in a lab where
     nothing else moves."""
     with (
-        Served() as server,
+        ServerProcess() as server,
         server.session("kinematics") as session,
         SceneClient(session) as scene,
     ):
-        label = find("kinematics").lab.Params.tunables["q1"].label
+        label = find_lab("kinematics").lab.Params.tunables["q1"].label
         scene.control(label)
         times = []
         for k in range(TRIES):
-            scene.skip(0.05 + 0.001 * (k % 37))  # not in step with the frames
+            scene.read_for(0.05 + 0.001 * (k % 37))  # not in step with the frames
             begin = time.perf_counter()
             scene.set(label, 0.6 if k % 2 else 0.4)
             scene.read_until(_turns_first_joint)
@@ -106,12 +106,12 @@ def _turns_first_joint(found: dict[str, Any]) -> bool:
 
 def page_to_motion() -> None:
     """From the page's request to the first scene message in which the robot moves."""
-    with Served() as server:
+    with ServerProcess() as server:
         warm = []
         for _ in range(5):
             warm.append(_open(server))
             time.sleep(3.0)  # the next spare warms up
-    with Served(ORCLAB_SPARES="0") as server:
+    with ServerProcess(ORCLAB_SPARES="0") as server:
         first = _open(server)
         cold = [_open(server) for _ in range(3)]
     print(
@@ -124,7 +124,7 @@ def page_to_motion() -> None:
     )
 
 
-def _open(server: Served) -> float:
+def _open(server: ServerProcess) -> float:
     begin = time.perf_counter()
     server.http.get("/labs/joint-control")
     with server.session("joint-control") as session:

@@ -7,30 +7,30 @@ from contextlib import ExitStack
 
 import psutil
 
-from tests.benchmarks.viewers import Crowd
-from tests.served import Opened, Served
+from tests.benchmarks.viewers import ViewerProcess
+from tests.server_process import ServerProcess, SessionClient
 
 LAB = "joint-control"
 
 
-def twelve(seconds: float = 60.0) -> None:
+def twelve_sessions(seconds: float = 60.0) -> None:
     """12 live sessions, each with a viewer."""
-    with Served(ORCLAB_MAX_SESSIONS="32") as server:
+    with ServerProcess(ORCLAB_MAX_SESSIONS="32") as server:
         _measure(server, 12, seconds, details=True)
 
 
-def growing(seconds: float = 10.0) -> None:
+def step_time_by_sessions(seconds: float = 10.0) -> None:
     """The time of a step as sessions grow in number."""
     print(f"{'sessions':>8} {'step [ms]':>10} {'RTF least':>10} {'RTF median':>11} {'CPU [%]':>8}")
     for count in (1, 2, 4, 8, 12, 16, 24):
-        with Served(ORCLAB_MAX_SESSIONS="32") as server:
+        with ServerProcess(ORCLAB_MAX_SESSIONS="32") as server:
             _measure(server, count, seconds, details=False)
 
 
-def _measure(server: Served, count: int, seconds: float, details: bool) -> None:
+def _measure(server: ServerProcess, count: int, seconds: float, details: bool) -> None:
     with ExitStack() as stack:
         opened = [stack.enter_context(server.session(LAB)) for _ in range(count)]
-        crowd = stack.enter_context(Crowd(server.address, [o.info for o in opened]))
+        crowd = stack.enter_context(ViewerProcess(server.address, [o.info for o in opened]))
         time.sleep(5.0)
         crowd.statuses()
         cpu, begin = _cpu(server), time.perf_counter()
@@ -38,11 +38,11 @@ def _measure(server: Served, count: int, seconds: float, details: bool) -> None:
         heard = crowd.statuses()
         elapsed = time.perf_counter() - begin
         cpu = _cpu(server) - cpu
-        factors = [_factor(heard[o.info["id"]]) for o in opened]
+        factors = [_real_time_factor(heard[o.info["id"]]) for o in opened]
         steps = [s["step_seconds"] for o in opened for s in heard[o.info["id"]]]
         share = 100 * cpu / elapsed
         if details:
-            _tell(server, opened, factors, share, seconds)
+            _report(server, opened, factors, share, seconds)
         else:
             print(
                 f"{count:8d} {1e3 * statistics.mean(steps):10.2f} {min(factors):10.3f} "
@@ -50,19 +50,23 @@ def _measure(server: Served, count: int, seconds: float, details: bool) -> None:
             )
 
 
-def _factor(statuses: list[dict[str, float]]) -> float:
+def _real_time_factor(statuses: list[dict[str, float]]) -> float:
     """Simulated over wall-clock time, from the first status heard to the last."""
     return (statuses[-1]["t"] - statuses[0]["t"]) / (statuses[-1]["wall"] - statuses[0]["wall"])
 
 
-def _cpu(server: Served) -> float:
+def _cpu(server: ServerProcess) -> float:
     """[s] of CPU the server and all below it have used."""
     processes = [psutil.Process(server.process.pid), *server.workers()]
     return sum(sum(p.cpu_times()[:2]) for p in processes)
 
 
-def _tell(
-    server: Served, opened: list[Opened], factors: list[float], share: float, seconds: float
+def _report(
+    server: ServerProcess,
+    opened: list[SessionClient],
+    factors: list[float],
+    share: float,
+    seconds: float,
 ) -> None:
     workers = [psutil.Process(pid) for pid in server.listeners()]
     own = sorted(p.memory_full_info().uss / 2**20 for p in workers)

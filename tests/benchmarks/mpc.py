@@ -20,18 +20,18 @@ from labs.algorithms.nonlinear_mpc import NonlinearMpc
 from labs.algorithms.nonlinear_mpc_problem import NonlinearMpcProblem
 from labs.algorithms.sensitivities import Sensitivities
 from labs.algorithms.stage_qp import StageQp
-from labs.models.discrete import Discrete
+from labs.models.discrete import DiscreteMechanism
 from labs.models.mechanisms import mechanism
 from labs.problems.receding_horizon import Plan
 from labs.resumable import run_to_completion
 from tests.benchmarks.mpc_linear import over_the_horizon
-from tests.benchmarks.mpc_sets import redrawn
-from tests.served import Served
+from tests.benchmarks.mpc_sets import wall_to_sets
+from tests.server_process import ServerProcess
 from tests.viser_client import SceneClient
 
 N, PERIOD, PERIODS = 30, 0.01, 80
 UR5 = mechanism("ur5")
-STRENGTH = UR5.control_limit
+TORQUE_LIMIT = UR5.control_limit
 TURN = np.array([0.8, -0.5, 0.4, 0.3, 0.2, 0.5])
 LIVE = 10.0
 """[s] of the live run."""
@@ -44,7 +44,7 @@ class DoubleIntegrators:
 
     def __init__(self) -> None:
         self.A = np.eye(12) + self.h * np.eye(12, k=6)
-        self.B = np.vstack([np.zeros((6, 6)), self.h * np.diag(20.0 / STRENGTH)])
+        self.B = np.vstack([np.zeros((6, 6)), self.h * np.diag(20.0 / TORQUE_LIMIT)])
 
     def step(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
         return np.asarray(self.A @ x + self.B @ u)
@@ -62,24 +62,26 @@ def reach(dynamics: Any, hold: np.ndarray) -> NonlinearMpcProblem:
         dynamics,
         N,
         Q=PERIOD * np.diag(np.repeat([10.0, 0.1], 6)),
-        R=PERIOD * np.diag(0.1 / STRENGTH**2),
+        R=PERIOD * np.diag(0.1 / TORQUE_LIMIT**2),
         Q_f=np.diag(np.repeat([30.0, 0.3], 6)),
         x_ref=np.concatenate([home + TURN, np.zeros(6)]),
         u_ref=hold,
         x_lower=np.concatenate([home - turn, np.full(6, -1.0)]),
         x_upper=np.concatenate([home + turn, np.full(6, 1.0)]),
-        u_lower=-0.5 * STRENGTH,
-        u_upper=0.5 * STRENGTH,
+        u_lower=-0.5 * TORQUE_LIMIT,
+        u_upper=0.5 * TORQUE_LIMIT,
     )
 
 
-def shifted(plan: Plan) -> Plan:
+def shift_guess(plan: Plan) -> Plan:
     """The guess of the next period."""
     X, U = np.vstack([plan.X[1:], plan.X[-1:]]), np.vstack([plan.U[1:], plan.U[-1:]])
     return replace(plan, X=X, U=U)
 
 
-def driven(problem: NonlinearMpcProblem, iterations: int | None) -> tuple[list[float], list[Plan]]:
+def drive_motion(
+    problem: NonlinearMpcProblem, iterations: int | None
+) -> tuple[list[float], list[Plan]]:
     """[s] of every period of a motion, and its plans."""
     planner, x, guess = NonlinearMpc(problem, iterations), np.zeros(12), None
     x[:6] = UR5.arm.home
@@ -89,16 +91,16 @@ def driven(problem: NonlinearMpcProblem, iterations: int | None) -> tuple[list[f
         plan = run_to_completion(planner.plan(x, guess))
         times.append(perf_counter() - begun)
         plans.append(plan)
-        x, guess = problem.dynamics.step(x, plan.U[0]), shifted(plan)
+        x, guess = problem.dynamics.step(x, plan.U[0]), shift_guess(plan)
     return times, plans
 
 
-def bare(problem: NonlinearMpcProblem, plans: list[Plan]) -> tuple[float, float]:
+def bare_seconds(problem: NonlinearMpcProblem, plans: list[Plan]) -> tuple[float, float]:
     """[s] medians of the derivative calls, and of the solver's update and solve, along a motion."""
     qp, planner = StageQp(problem, N), NonlinearMpc(problem)
     model, data, calls, solves = UR5.model, UR5.data, [], []
     for plan in plans[:-1]:
-        at = shifted(plan)
+        at = shift_guess(plan)
         points = [(x[:6].copy(), x[6:].copy(), u) for x, u in zip(at.X, at.U, strict=False)]
         begun = perf_counter()
         for q, v, u in points:
@@ -113,10 +115,10 @@ def bare(problem: NonlinearMpcProblem, plans: list[Plan]) -> tuple[float, float]
 
 def on_the_ur5() -> None:
     """UR5, joint space, N = 30, limits active, 10 ms: at most 1.6 times its bare parts."""
-    problem = reach(Discrete(UR5, PERIOD), UR5.holding(UR5.arm.home + TURN))
-    driven(problem, 1)
-    times, plans = driven(problem, 1)
-    calls, solves = bare(problem, plans)
+    problem = reach(DiscreteMechanism(UR5, PERIOD), UR5.equilibrium_control(UR5.arm.home + TURN))
+    drive_motion(problem, 1)
+    times, plans = drive_motion(problem, 1)
+    calls, solves = bare_seconds(problem, plans)
     active = [sum(int(rows.sum()) for rows in plan.active.values()) for plan in plans]
     phases = {name: median(plan.seconds[name] for plan in plans) for name in plans[0].seconds}
     step = median(times)
@@ -129,10 +131,10 @@ def on_the_ur5() -> None:
     print(f"    {100 * step / PERIOD:.0f} % of the period; up to {max(active)} limits active")
 
 
-def live() -> None:
+def live_session() -> None:
     """The lab's UR5 with a viewer, its target going round: time held, deadlines missed."""
     with (
-        Served() as server,
+        ServerProcess() as server,
         server.session("mpc") as session,
         SceneClient(session) as scene,
         session.stream() as stream,
@@ -171,15 +173,17 @@ def beside_do_mpc() -> None:
     print("six double integrators, N = 30               median       max    cost of the motion")
     print(f"{'do-mpc':38} {_spread(peer)} {costs:9.4f}")
     for title, iterations in (("a real-time iteration", 1), ("ours, to convergence", None)):
-        driven(problem, iterations)
-        times, plans = driven(problem, iterations)
+        drive_motion(problem, iterations)
+        times, plans = drive_motion(problem, iterations)
         X, U = np.array([plan.X[0] for plan in plans]), np.array([plan.U[0] for plan in plans])
         cost = problem.cost(X, U[:-1])
         print(
             f"{title:38} {_spread(times)} {cost:9.4f}"
             f"   {median(peer) / median(times):.1f} times as fast"
         )
-    times, _ = driven(reach(Discrete(UR5, PERIOD), UR5.holding(UR5.arm.home + TURN)), 1)
+    times, _ = drive_motion(
+        reach(DiscreteMechanism(UR5, PERIOD), UR5.equilibrium_control(UR5.arm.home + TURN)), 1
+    )
     print(f"{'(a real-time iteration of the UR5)':38} {_spread(times)}")
 
 
@@ -222,8 +226,8 @@ def _do_mpc(do_mpc: Any, problem: NonlinearMpcProblem) -> tuple[list[float], flo
     return times, problem.cost(np.array(X), np.array(U)[:-1])
 
 
-def everything() -> None:
+def mpc_benchmarks() -> None:
     """All of them, linear MPC over its horizon, and the sets of the plane."""
-    for measure in (on_the_ur5, live, beside_do_mpc, over_the_horizon, redrawn):
+    for measure in (on_the_ur5, live_session, beside_do_mpc, over_the_horizon, wall_to_sets):
         measure()
         print()

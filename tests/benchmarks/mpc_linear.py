@@ -4,7 +4,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from labs.algorithms import mpc
-from labs.algorithms.linear_mpc import Form, LinearPlanner
+from labs.algorithms.linear_mpc import LinearPlanner, QpForm
 from labs.algorithms.mpc import MpcOptions
 from labs.problems.linear_mpc import LinearMpcProblem
 from labs.problems.polyhedron import box
@@ -58,7 +58,7 @@ def _chain(masses: int, N: int) -> tuple[LinearMpcProblem, np.ndarray]:
 
 
 def _loop(
-    problem: LinearMpcProblem, x: np.ndarray, form: Form, warm: bool
+    problem: LinearMpcProblem, x: np.ndarray, form: QpForm, warm: bool
 ) -> tuple[float, np.ndarray, int]:
     """The mean time of a QP [ms], the controls (PERIODS, m), and how many limits are active at
     first."""
@@ -76,7 +76,7 @@ def _loop(
         controls.append(plan.U[0])
         active.append(sum(int(rows.sum()) for rows in plan.active.values()))
         x = model(x, plan.U[0])
-        guess = mpc.shift(plan, 1, model, options)
+        guess = mpc.shift_plan(plan, 1, model, options)
     return float(np.mean(times[1:])), np.array(controls), active[0]
 
 

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.optimal_control.ddp.lab import DdpState
 from labs.params import Knob, Value
 from tests.labs.solving import solve_to_convergence
-from tests.served import Served
+from tests.server_process import ServerProcess
 from tests.viser_client import SceneClient
 
 MOVES = 40
@@ -23,24 +23,24 @@ def weight_to_motion() -> None:
     """From the message of a weight's slider, over all iterations of the new solve, to the scene
     message with the path of the UR5's new motion: the same, bit for bit, as a world beside it
     finds from the same changes."""
-    twin = World(find("ddp"), REACH)
+    twin = World(find_lab("ddp"), REACH)
     knob = twin.params.tunables["control"]
     assert isinstance(knob, Knob)
     solve_to_convergence(twin)
     with (
-        Served() as server,
+        ServerProcess() as server,
         server.session("ddp", params=REACH) as session,
         SceneClient(session) as scene,
     ):
         scene.control(knob.label)
-        scene.skip(2.0)
+        scene.read_for(2.0)
         times, iterations = [], []
         for k in range(MOVES):
             weight = knob.nearest(0.3 + 0.02 * k if k % 2 else 1.5 + 0.02 * k)
             twin.change({"control": weight})
             iterations.append(solve_to_convergence(twin))
             path = _on_the_wire(twin)
-            scene.skip(0.2 + 0.001 * (k % 37))  # not in step with the frames
+            scene.read_for(0.2 + 0.001 * (k % 37))  # not in step with the frames
             begin = time.perf_counter()
             scene.set(knob.label, knob.position(weight))
             while path not in scene.socket.recv(20.0):

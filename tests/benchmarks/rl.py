@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from labs.algorithms import bandits, prediction
-from labs.algorithms.exploration import BOLTZMANN, CONFIDENCE, THOMPSON, BehaviourPolicy
+from labs.algorithms.exploration import BOLTZMANN, CONFIDENCE_BOUND, THOMPSON, BehaviourPolicy
 from labs.problems.episodes import UpdateRule
-from labs.tasks.random_walk.walks import NINETEEN, walk_task
+from labs.tasks.random_walk.walks import NINETEEN_STATE_WALK, walk_task
 from tests.benchmarks import dqn, stable_baselines3
 
 STEPS, DECAYS = 2 ** np.arange(10), (0.0, 0.4, 0.8, 0.9, 0.95, 0.975, 0.99, 1.0)
@@ -20,12 +20,12 @@ STRATEGIES = {
     "epsilon = 0.1": BehaviourPolicy(epsilon=0.1),
     "epsilon = 1/n": BehaviourPolicy(epsilon=1.0, decay=1.0),
     "Boltzmann": BehaviourPolicy(BOLTZMANN, beta=4.0),
-    "lowest bound": BehaviourPolicy(CONFIDENCE, bound=1.0),
+    "lowest bound": BehaviourPolicy(CONFIDENCE_BOUND, bound=1.0),
     "Thompson": BehaviourPolicy(THOMPSON, bound=1.0),
 }
 
 
-def everything() -> None:
+def rl_benchmarks() -> None:
     """All of them."""
     for measure in (sweeps, dqn.training, stable_baselines3.deep_q_learning):
         measure()
@@ -39,7 +39,7 @@ def sweeps() -> None:
     decays = [{"trace_decay": decay} for decay in DECAYS]
     for name, method in (
         ("lambda-returns", prediction.LAMBDA_RETURN),
-        ("eligibility traces", prediction.TRACES),
+        ("eligibility traces", prediction.ELIGIBILITY_TRACES),
         ("true online TD(lambda)", prediction.TRUE_ONLINE),
     ):
         _predict(name, method, decays)
@@ -47,7 +47,7 @@ def sweeps() -> None:
 
 
 def _predict(name: str, method: int, settings: Sequence[Mapping[str, Any]]) -> None:
-    task = walk_task(NINETEEN)
+    task = walk_task(NINETEEN_STATE_WALK)
     learners = prediction.init(task, RUNS, np.random.default_rng(0))
     prediction.step(task, UpdateRule(0.1), method, learners, 1)  # compiled
     begin, wall, steps = time.process_time(), time.perf_counter(), 0

@@ -28,20 +28,20 @@ def deep_q_learning() -> None:
         print("Stable-Baselines3 is not installed: pip install 'orclab[peers]'")
         return
     torch.set_num_threads(1)
-    ours = min(_ours() for _ in range(REPEATS))
+    ours = min(_own_step_seconds() for _ in range(REPEATS))
     print(f"ours, {ROBOTS} robots: {1.0 / ours:8.0f} steps a second")
     for robots in (1, ROBOTS):
-        theirs = min(_theirs(peer, robots) for _ in range(REPEATS))
+        theirs = min(_sb3_step_seconds(peer, robots) for _ in range(REPEATS))
         print(
             f"Stable-Baselines3 {peer.__version__}, {robots:2} robots: {1.0 / theirs:6.0f} steps "
             f"a second; ours {theirs / ours:.0f} times (asked: {ASKED:.0f})"
         )
 
 
-def _ours() -> float:
+def _own_step_seconds() -> float:
     """[s] of a step."""
     environment = swing_up("pendulum")
-    options = dqn.DqnOptions(batch=BATCH, update_every=UPDATE_EVERY, warm_up=WARM_UP)
+    options = dqn.DqnOptions(batch_size=BATCH, update_every=UPDATE_EVERY, warm_up=WARM_UP)
     agent = dqn.init(environment, HIDDEN, np.random.default_rng(0), many=ROBOTS)
     agent = dqn.step(environment, options, agent, 2 * WARM_UP // ROBOTS)  # compiled, warm
     begin = time.process_time()
@@ -51,7 +51,7 @@ def _ours() -> float:
     return (time.process_time() - begin) / STEPS
 
 
-def _theirs(peer: Any, robots: int) -> float:
+def _sb3_step_seconds(peer: Any, robots: int) -> float:
     """[s] of a step."""
     envs = peer.common.env_util.make_vec_env("labs.gym:orclab/Pendulum-v0", robots, seed=0)
     many = max(1, UPDATE_EVERY // robots)

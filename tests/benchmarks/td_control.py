@@ -8,7 +8,7 @@ import numpy as np
 
 from labs.algorithms.exploration import EPSILON_GREEDY, BehaviourPolicy
 from labs.algorithms.td_control import Q_LEARNING, SARSA, SARSA_LAMBDA, SARSA_N, init, step
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.problems.episodes import EpisodicTask, UpdateRule
 from labs.reinforcement_learning.td_control.tasks import ControlTask, grid_task, pendulum_task
@@ -121,7 +121,7 @@ def _plain(task: EpisodicTask, episodes: int) -> float:
 
 def _iterations(preset: str) -> list[float]:
     """[s] each iteration of the lab's training."""
-    entry = find("td-control")
+    entry = find_lab("td-control")
     entry.lab.prepare()
     world, seconds = World(entry, entry.lab.presets[preset]), []
     while world.solving:

@@ -10,12 +10,12 @@ from typing import Any
 
 import websockets
 
-from tests.viser_client import PROTOCOL, camera
+from tests.viser_client import PROTOCOL, camera_message
 
 Statuses = dict[str, list[dict[str, Any]]]
 
 
-class Crowd:
+class ViewerProcess:
     """A process of viewers, one a session. `with Crowd(address, infos) as crowd`."""
 
     def __init__(self, address: str, sessions: list[dict[str, Any]]) -> None:
@@ -23,7 +23,7 @@ class Crowd:
         context = multiprocessing.get_context("spawn")
         self._process = context.Process(target=_watch, args=(address, sessions, theirs))
 
-    def __enter__(self) -> "Crowd":
+    def __enter__(self) -> "ViewerProcess":
         self._process.start()
         return self
 
@@ -68,7 +68,7 @@ async def _read_scene(address: str, info: dict[str, Any]) -> None:
         max_size=None,
         compression=None,
     ) as socket:
-        await socket.send(camera())
+        await socket.send(camera_message())
         async for _ in socket:
             pass
 

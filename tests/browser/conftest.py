@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
 from tests import chromium as chromium_browser
-from tests.served import PATIENCE, Served
+from tests.server_process import TIMEOUT, ServerProcess
 
 SCREENSHOTS = Path("screenshots")
 SLOW_SCENES = """if (location.pathname.startsWith("/scene/")) {
@@ -18,7 +18,7 @@ SLOW_SCENES = """if (location.pathname.startsWith("/scene/")) {
   window.cancelAnimationFrame = clearTimeout;
 }"""
 """Some 9 frames a second: drawn in software at full speed, a scene takes a core and more."""
-Visit = Callable[..., BrowserContext]
+OpenContext = Callable[..., BrowserContext]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -29,7 +29,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(scope="session")
 def chromium() -> Iterator[Browser]:
-    path = chromium_browser.find()
+    path = chromium_browser.find_browser()
     if path is None:
         if os.environ.get("CI"):
             pytest.fail("CI must have a browser: install Debian's chromium")
@@ -41,22 +41,22 @@ def chromium() -> Iterator[Browser]:
 
 
 @pytest.fixture
-def visit(chromium: Browser) -> Iterator[Visit]:
+def open_context(chromium: Browser) -> Iterator[OpenContext]:
     """Makes browser contexts whose pages must not complain: any script error, in a scene too,
     fails the test. All are closed at the end, whatever happened."""
     opened: list[BrowserContext] = []
     errors: list[str] = []
 
-    def make(server: Served, **options: Any) -> BrowserContext:
+    def make(server: ServerProcess, **options: Any) -> BrowserContext:
         options = {"viewport": {"width": 1280, "height": 800}} | options
         context = chromium.new_context(base_url=server.address, **options)
-        context.set_default_timeout(1000 * PATIENCE)
+        context.set_default_timeout(1000 * TIMEOUT)
         context.add_init_script(SLOW_SCENES)
         context.on("weberror", lambda error: errors.append(str(error.error)))
         opened.append(context)
         return context
 
-    expect.set_options(timeout=1000 * PATIENCE)
+    expect.set_options(timeout=1000 * TIMEOUT)
     yield make
     for context in opened:
         for page in context.pages:
@@ -68,8 +68,8 @@ def visit(chromium: Browser) -> Iterator[Visit]:
 
 
 @pytest.fixture
-def context(visit: Visit, served: Served) -> BrowserContext:
-    return visit(served, accept_downloads=True)
+def context(open_context: OpenContext, shared_server: ServerProcess) -> BrowserContext:
+    return open_context(shared_server, accept_downloads=True)
 
 
 @pytest.fixture

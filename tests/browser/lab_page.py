@@ -16,7 +16,7 @@ FRAMES = """count => new Promise(done => {
   next();
 })"""
 
-WHOLE = """([selector, first]) => {
+IN_VIEW_SCRIPT = """([selector, first]) => {
   const found = [...document.querySelectorAll(selector)].slice(0, first ? 1 : undefined);
   return found.length > 0 && found.every(element => {
     const box = element.getBoundingClientRect();
@@ -33,7 +33,7 @@ WHOLE = """([selector, first]) => {
   });
 }"""
 
-FILLED = """selector => [...document.querySelectorAll(selector)].every(plot => {
+FILLED_SCRIPT = """selector => [...document.querySelectorAll(selector)].every(plot => {
   const marks = "td, .note p, .chart :is(.curve, .point, .column)";
   if (plot.querySelector(marks)) return true;
   const canvas = plot.querySelector("canvas");
@@ -50,7 +50,7 @@ FILLED = """selector => [...document.querySelectorAll(selector)].every(plot => {
 Message = dict[str, Any]
 
 
-def leave_out(route: Route) -> None:
+def block_scene(route: Route) -> None:
     """In place of a scene: drawing it in software is most of the work of a test."""
     route.fulfill(body="<!doctype html>")
 
@@ -68,7 +68,7 @@ class LabPage:
         self.page = page
         page.on("websocket", self._opened)
         if not scene:
-            page.route(SCENES, leave_out)
+            page.route(SCENES, block_scene)
 
     def open(self, slug: str, query: str = "") -> "LabPage":
         """Opens a lab and waits until it lives."""
@@ -98,15 +98,15 @@ class LabPage:
         expect(plot).to_be_visible()
         return plot
 
-    def whole(self, selector: str, first: bool = False) -> bool:
+    def is_in_view(self, selector: str, first: bool = False) -> bool:
         """Whether all (or the first) that a selector finds is in view, without scrolling, and
         there is some."""
-        found: bool = self.page.evaluate(WHOLE, [selector, first])
+        found: bool = self.page.evaluate(IN_VIEW_SCRIPT, [selector, first])
         return found
 
     def wait_filled(self, selector: str) -> None:
         """Waits until every plot that a selector finds shows something."""
-        self.page.wait_for_function(FILLED, arg=selector)
+        self.page.wait_for_function(FILLED_SCRIPT, arg=selector)
 
     def unfold_panel(self) -> None:
         """Opens the scene's own panel, which waits as a strip at its side."""
@@ -144,7 +144,7 @@ class LabPage:
         status: Message = json.loads(self.page.request.get(found[0]).text())
         return status
 
-    def told(
+    def next_message(
         self, type: str = "status", when: Callable[[Message], bool] = lambda m: True
     ) -> Message:
         """The next message of a type that the page is told, and that fulfils a condition."""

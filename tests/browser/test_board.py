@@ -13,7 +13,7 @@ from tests.browser.lab_page import LabPage
 ONE_WALL = "........\n........\n....#...\n........\n........\n........"
 
 
-def wall(lab: LabPage) -> tuple[float, float]:
+def find_wall(lab: LabPage) -> tuple[float, float]:
     """Where on the page the map's only wall is drawn: dark grey, unlike all else that is."""
     image = lab.pixels("#robot")
     height, width, _ = image.shape
@@ -37,7 +37,7 @@ def is_drawn(image: np.ndarray) -> bool:
 def test_a_click_on_a_cell_changes_the_map(page: Page) -> None:
     lab = LabPage(page).open("board", f"?map={quote(ONE_WALL)}")
     lab.pixels_when("#robot", is_drawn)
-    place = wall(lab)
+    place = find_wall(lab)
     before = lab.status()["params"]["map"].split("\n")
     assert before[2][4] == "#"
     page.mouse.click(*place)
@@ -53,7 +53,7 @@ def test_a_board_waves_and_a_surface_over_it(page: Page) -> None:
     lab = LabPage(page).open("board", "?rate=5")
     seen = [lab.pixels_when("#robot", is_drawn)]
     for _ in range(8):
-        lab.told("telemetry", when=lambda m: m["rows"] != [])
+        lab.next_message("telemetry", when=lambda m: m["rows"] != [])
         seen.append(lab.pixels("#robot"))
     lab.pixels_when("#robot", lambda now: np.abs(now - seen[0]).max() > 60)  # the colours move
     parts = [colored(image) for image in seen]

@@ -39,12 +39,12 @@ def count(root: ElementTree.Element, name: str) -> int:
     return len(root.findall(f".//{SVG}{name}"))
 
 
-def words(root: ElementTree.Element) -> str:
+def picture_texts(root: ElementTree.Element) -> str:
     """All texts of a picture, one a line."""
     return "\n".join("".join(text.itertext()) for text in root.iter(f"{SVG}text"))
 
 
-def keep(name: str, content: bytes) -> None:
+def save_for_review(name: str, content: bytes) -> None:
     """For people to look at."""
     SCREENSHOTS.mkdir(exist_ok=True)
     (SCREENSHOTS / name).write_bytes(content)
@@ -76,12 +76,12 @@ def test_every_kind_of_plot_leaves_the_page(page: Page) -> None:
         root = ElementTree.fromstring(svg)
         for kind, most in least.items():
             assert count(root, kind) >= most, (title, kind)
-        said = words(root)
+        said = picture_texts(root)
         assert said.startswith(title)
         for part in ("Oscillator, notes T.1", "seed 3", "= 25 1/s", "Noise = on"):
             assert part in said, title
         png = save(page, f"Save {title}", "png")[1]
-        keep(f"figure-{title.lower()}.png", png)
+        save_for_review(f"figure-{title.lower()}.png", png)
         check_picture(root, png)
         table = save(page, f"Save {title}", "csv")[1].decode()
         data = json.loads(save(page, f"Save {title}", "json")[1])["plots"][0]
@@ -95,10 +95,10 @@ def test_every_kind_of_plot_leaves_the_page(page: Page) -> None:
             assert [float(row[header.index("x")]) for row in rows] == data["data"]["x"]
     check_menu(page, lab)
     svg = save(page, ALL, "svg")[1]
-    said = words(ElementTree.fromstring(svg))
+    said = picture_texts(ElementTree.fromstring(svg))
     assert all(title in said for title in [*DRAWN, "Phase"]), "those behind tabs, too"
     png = save(page, ALL, "png")[1]
-    keep("figures.png", png)
+    save_for_review("figures.png", png)
     check_picture(ElementTree.fromstring(svg), png)
     assert save(page, ALL, "csv")[0] == "oscillator-plots.zip"
     assert len(json.loads(save(page, ALL, "json")[1])["plots"]) == len(DRAWN) + 1

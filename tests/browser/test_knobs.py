@@ -52,9 +52,9 @@ def test_only_what_acts_is_shown_and_what_was_folded_stays_folded(page: Page) ->
     lab.value("controller").select_option(label="PID")
     for row in gains:
         expect(row).to_be_visible()
-    assert lab.whole("#param-kp"), "all three gains are in view"
-    assert lab.whole("#param-ki")
-    assert lab.whole("#param-kd")
+    assert lab.is_in_view("#param-kp"), "all three gains are in view"
+    assert lab.is_in_view("#param-ki")
+    assert lab.is_in_view("#param-kd")
     assert page.locator("#param-controller").bounding_box() == top, "what stays does not move"
     expect(lab.value("ki")).to_have_value("40")  # kept while it was hidden
     lab.value("controller").select_option(label="PD + gravity compensation")
@@ -91,7 +91,7 @@ def test_a_symbol_in_the_article_is_its_knob(page: Page) -> None:
     expect(beside).to_contain_text("kp takes a number from 0 to 2000")
     field.fill("2,5")
     field.press("Enter")
-    lab.told(when=lambda s: s["params"]["kp"] == 2.5)
+    lab.next_message(when=lambda s: s["params"]["kp"] == 2.5)
     expect(lab.value("kp")).to_have_value("2.5")
     page.mouse.click(640, 5)
     expect(beside).to_be_hidden()
@@ -104,7 +104,7 @@ def test_a_symbol_in_the_article_is_its_knob(page: Page) -> None:
     for k in range(1, 7):
         page.mouse.move(x + 10 * k, y)
     page.mouse.up()
-    dragged = lab.told(when=lambda s: s["params"]["kp"] > 10.0)["params"]["kp"]
+    dragged = lab.next_message(when=lambda s: s["params"]["kp"] > 10.0)["params"]["kp"]
     expect(beside).to_be_visible()  # it stays for the hand that let go
     assert dragged < 100.0
     page.keyboard.press("Escape")
@@ -115,7 +115,7 @@ def test_a_symbol_in_the_article_is_its_knob(page: Page) -> None:
     symbol.press("Enter")
     expect(beside.get_by_role("slider")).to_be_focused()
     beside.get_by_role("slider").press("End")
-    lab.told(when=lambda s: s["params"]["kp"] == 2000.0)
+    lab.next_message(when=lambda s: s["params"]["kp"] == 2000.0)
     page.keyboard.press("Escape")
     expect(beside).to_be_hidden()
     expect(symbol).to_be_focused()

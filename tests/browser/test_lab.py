@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 from playwright.sync_api import BrowserContext, Page, WebSocketRoute, expect
 
-from labs.engine.catalog import find
-from tests.browser.conftest import Visit, screenshot
+from labs.engine.catalog import find_lab
+from tests.browser.conftest import OpenContext, screenshot
 from tests.browser.lab_page import LabPage, wait_frames
-from tests.served import Served
+from tests.server_process import ServerProcess
 
 
 def test_the_robot_is_seen_and_moves(page: Page) -> None:
     lab = LabPage(page).open("joint-control")
-    lab.told(when=lambda s: s["t"] > 5)  # the camera has seen all of the motion, and stands
+    lab.next_message(when=lambda s: s["t"] > 5)  # the camera has seen all of the motion, and stands
     height, width, _ = lab.pixels("#robot").shape
     middle = (slice(height // 5, height), slice(width // 6, width * 2 // 3))
     moved, before = 0.0, lab.pixels("#robot")[middle]
     for _ in range(60):  # software rendering takes its time to draw the first meshes
-        lab.told()  # half a second of the robot's time, at most
+        lab.next_message()  # half a second of the robot's time, at most
         now = lab.pixels("#robot")[middle]
         moved = float((np.abs(now - before).max(axis=2) > 40).mean())
         if 0.002 < moved < 0.1:
@@ -44,11 +44,11 @@ def test_time_and_plots_run_and_pause(page: Page) -> None:
     described.to_have_accessible_description(re.compile(r"t = [\d.]+ s; RMS error: [\d.]+ rad"))
     page.keyboard.press("Space")
     expect(page.locator("#run")).to_have_text(re.compile("Run"))
-    lab.told()
+    lab.next_message()
     wait_frames(page)
     still, t = lab.pixels(plot), lab.time()
-    lab.told()
-    lab.told()
+    lab.next_message()
+    lab.next_message()
     assert lab.time() == t
     assert (lab.pixels(plot) == still).all(), "the curves stand"
     page.keyboard.press(".")
@@ -97,9 +97,9 @@ def test_dragging_a_knob_changes_the_motion(page: Page) -> None:
         page.mouse.move(box["x"] + 7 + (0.9 - 0.02 * k) * (box["width"] - 14), y)
         wait_frames(page)
     page.mouse.up()
-    softened = lab.told(when=lambda s: 0 < s["params"]["kp"] < 400)
+    softened = lab.next_message(when=lambda s: 0 < s["params"]["kp"] < 400)
     # A softer spring sags more under the same weight: e = g / k_p.
-    lab.told(when=lambda s: s["t"] > softened["t"] + 2.5)
+    lab.next_message(when=lambda s: s["t"] > softened["t"] + 2.5)
     wait_frames(page)
     error = page.locator("#tiles").inner_text()
     found = re.search(r"Steady-state.*?\n([\d.]+)", error, re.DOTALL)
@@ -117,7 +117,7 @@ def test_a_number_is_taken_as_a_person_types_it(page: Page, typed: str, value: f
     page.keyboard.type(typed)
     expect(lab.value("kp")).to_have_value(typed)
     page.keyboard.press("Enter")
-    lab.told(when=lambda s: s["params"]["kp"] == value)
+    lab.next_message(when=lambda s: s["params"]["kp"] == value)
 
 
 def test_a_track_goes_by_keyboard(page: Page) -> None:
@@ -125,10 +125,10 @@ def test_a_track_goes_by_keyboard(page: Page) -> None:
     track = page.locator("#track-amplitude")
     for key, value in (("End", 0.8), ("Home", 0.0), ("ArrowUp", 0.01), ("PageUp", 0.11)):
         track.press(key)
-        lab.told(when=lambda s, value=value: s["params"]["amplitude"] == value)  # type: ignore[misc]
+        lab.next_message(when=lambda s, value=value: s["params"]["amplitude"] == value)  # type: ignore[misc]
     expect(track).to_have_attribute("aria-valuetext", "0.11 rad")
     track.dblclick()
-    lab.told(when=lambda s: s["params"]["amplitude"] == 0.3)
+    lab.next_message(when=lambda s: s["params"]["amplitude"] == 0.3)
 
 
 def test_the_knobs_set_values_and_keep_wrong_ones(page: Page) -> None:
@@ -181,9 +181,11 @@ def test_an_experiment_stays_the_current_one_however_late_its_settings_arrive(pa
     current = page.locator(".experiment.current")
     expect(current).to_have_count(1)
     for _ in range(4):
-        lab.told()  # still the old settings, for two seconds
+        lab.next_message()  # still the old settings, for two seconds
     page.evaluate("console.log('now')")
-    lab.told(when=lambda s: s["params"] != find("joint-control").lab.Params().model_dump())
+    lab.next_message(
+        when=lambda s: s["params"] != find_lab("joint-control").lab.Params().model_dump()
+    )
     wait_frames(page)
     expect(current).to_have_count(1)
     lab.value("payload").fill("4")
@@ -191,12 +193,14 @@ def test_an_experiment_stays_the_current_one_however_late_its_settings_arrive(pa
     expect(current).to_have_count(0)
 
 
-def test_a_shared_link_shows_the_same(page: Page, visit: Visit, served: Served) -> None:
+def test_a_shared_link_shows_the_same(
+    page: Page, open_context: OpenContext, shared_server: ServerProcess
+) -> None:
     lab = LabPage(page, scene=False).open("joint-control", "?seed=3")
     lab.value("kp").fill("420")
     lab.value("kp").press("Enter")
     expect(page).to_have_url(re.compile("kp=420"))
-    second = LabPage(visit(served).new_page(), scene=False)
+    second = LabPage(open_context(shared_server).new_page(), scene=False)
     second.page.goto(page.url)
     second.wait_live()
     expect(second.value("kp")).to_have_value("420")
@@ -217,7 +221,7 @@ def test_a_link_keeps_what_it_can_and_says_what_not(page: Page) -> None:
 
 def test_the_run_can_be_taken_home(page: Page, tmp_path: Path) -> None:
     lab = LabPage(page, scene=False).open("joint-control")
-    lab.told(when=lambda s: s["t"] > 0.6)
+    lab.next_message(when=lambda s: s["t"] > 0.6)
     for form in ("csv", "json", "npz"):
         page.get_by_role("button", name="Export").click()
         with page.expect_download() as download:
@@ -248,8 +252,8 @@ def test_the_scene_is_loaded_once_whatever_begins_anew(page: Page) -> None:
     page.on("request", lambda r: loaded.append(r.url) if r.resource_type == "document" else None)
     lab = LabPage(page).open("joint-control")
     page.click("[data-do=reset]")
-    lab.told(when=lambda s: s["run"] > 1)
-    lab.told()
+    lab.next_message(when=lambda s: s["run"] > 1)
+    lab.next_message()
     expect(lab.scene.locator("canvas").first).to_be_visible()
     assert len([url for url in loaded if "/scene/" in url]) == 1
 

@@ -7,9 +7,9 @@ from typing import Literal
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.conftest import Visit, screenshot
-from tests.browser.lab_page import SCENES, LabPage, leave_out, wait_frames
-from tests.served import Served
+from tests.browser.conftest import OpenContext, screenshot
+from tests.browser.lab_page import SCENES, LabPage, block_scene, wait_frames
+from tests.server_process import ServerProcess
 
 SIZES = {"phone": (360, 740), "tablet": (820, 1180), "laptop": (1366, 768), "wall": (3840, 2160)}
 SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
@@ -42,11 +42,11 @@ def test_knobs_robot_and_plots_are_in_view_together(page: Page, width: int, heig
     ):
         lab = LabPage(page, scene=False).open(slug, query)
         for part in ("#view", "#transport", "#tiles", "#plots > :not([hidden])", "#plot-tabs"):
-            assert lab.whole(part), (slug, part)
+            assert lab.is_in_view(part), (slug, part)
         scene = page.locator("#view").bounding_box()
         assert scene
         assert scene["width"] >= 0.45 * width
-        assert all(lab.whole(f"#param-{name}") for name in knobs)
+        assert all(lab.is_in_view(f"#param-{name}") for name in knobs)
         screenshot(page, f"{slug}-{width}")
 
 
@@ -77,7 +77,7 @@ def test_what_the_reader_arranges_is_kept(page: Page) -> None:
         page.locator(f"[data-border={name}]").press("End")
     wait_frames(page)
     for part in ("#view", "#transport", "#tiles", "#plots", "#plot-tabs"):
-        assert lab.whole(part), part
+        assert lab.is_in_view(part), part
     border.dblclick()
     wait_frames(page)
     again = page.locator("#article").bounding_box()
@@ -93,7 +93,7 @@ def test_a_tablet_has_all_parts_in_view(page: Page, width: int, height: int) -> 
     expect(page.locator(".experiment.current")).to_be_visible()
     wait_frames(page)
     for part in ("#view", "#transport", ".plot.watched", ".current .observe", "#param-deviation"):
-        assert lab.whole(part), part
+        assert lab.is_in_view(part), part
     screenshot(page, f"lqr-{width}")
 
 
@@ -113,7 +113,7 @@ def test_on_a_phone_the_card_holds_its_knobs_and_its_plot(page: Page) -> None:
     assert abs(card.evaluate(top) - before) < 844, "nobody is thrown far"
     buttons = ("#run", "#solve", "[data-sheet=knobs]", ".experiment.current .try")
     for part in ("#view", *buttons, ".experiment.current .question"):
-        assert lab.whole(part), part
+        assert lab.is_in_view(part), part
     solver, sheets = (page.locator(part).bounding_box() for part in ("#solve", ".sheets"))
     assert solver
     assert sheets
@@ -139,7 +139,7 @@ def test_on_a_phone_the_card_holds_its_knobs_and_its_plot(page: Page) -> None:
     expect(page.locator("#plots > .watched")).to_be_visible()
 
 
-CUT = "says => says.scrollWidth > says.clientWidth + 1"
+IS_TRUNCATED = "says => says.scrollWidth > says.clientWidth + 1"
 
 
 def test_what_the_slim_row_has_no_room_for_is_a_button_away(page: Page) -> None:
@@ -152,22 +152,22 @@ def test_what_the_slim_row_has_no_room_for_is_a_button_away(page: Page) -> None:
     )
     expect(says).to_have_text(re.compile("of the window"))
     expect(more).to_have_text(re.compile(r"^\+\d+$"))
-    assert not lab.whole(tiles)
-    assert says.evaluate(CUT)
+    assert not lab.is_in_view(tiles)
+    assert says.evaluate(IS_TRUNCATED)
     plots = page.locator("#plots").bounding_box()
     more.press("Enter")
     expect(more).to_have_attribute("aria-expanded", "true")
     wait_frames(page)
-    assert lab.whole(tiles)
-    assert lab.whole("#solver-says")
-    assert not says.evaluate(CUT)
+    assert lab.is_in_view(tiles)
+    assert lab.is_in_view("#solver-says")
+    assert not says.evaluate(IS_TRUNCATED)
     assert page.locator("#plots").bounding_box() == plots, "nothing else moves"
     screenshot(page, "numbers-unfolded")
     page.keyboard.press("Escape")
     expect(more).to_have_attribute("aria-expanded", "false")
     page.set_viewport_size({"width": 3840, "height": 1200})
     expect(more).to_be_hidden()
-    assert lab.whole(tiles)
+    assert lab.is_in_view(tiles)
 
 
 def test_a_moved_knob_stays_in_hand(page: Page) -> None:
@@ -182,7 +182,7 @@ def test_a_moved_knob_stays_in_hand(page: Page) -> None:
             expect(page.locator(f"{place} .tile.marked")).to_be_visible()
         track = page.locator(f"{place} #track-gamma")
         track.press("ArrowLeft")
-        lab.told(when=lambda status: status["params"]["gamma"] < 0.95)
+        lab.next_message(when=lambda status: status["params"]["gamma"] < 0.95)
         expect(page.locator(".experiment.current")).to_have_count(0)
         wait_frames(page)
         expect(track).to_be_focused()
@@ -201,7 +201,7 @@ def lightness(page: Page) -> int:
 
 def test_the_article_reads_before_anything_is_pressed(page: Page) -> None:
     """Mathematics is text set in the mathematics font, and there without scripts."""
-    page.route(SCENES, leave_out)
+    page.route(SCENES, block_scene)
     page.goto("/labs/joint-control")
     formula = page.locator("article math").first
     expect(formula).to_be_visible()
@@ -210,8 +210,10 @@ def test_the_article_reads_before_anything_is_pressed(page: Page) -> None:
     assert page.evaluate("document.fonts.check('16px \"STIX Two Math\"')")
 
 
-def test_the_article_reads_without_scripts(visit: Visit, served: Served) -> None:
-    page = visit(served, java_script_enabled=False).new_page()
+def test_the_article_reads_without_scripts(
+    open_context: OpenContext, shared_server: ServerProcess
+) -> None:
+    page = open_context(shared_server, java_script_enabled=False).new_page()
     page.goto("/labs/joint-control")
     expect(page.locator("article math").first).to_be_visible()
     expect(page.get_by_role("heading", level=1)).to_be_visible()
@@ -241,8 +243,10 @@ def test_the_theme_is_switched_and_kept(page: Page) -> None:
     assert lightness(page) < 200
 
 
-def test_no_address_outside_is_asked(visit: Visit, served: Served) -> None:
-    page = visit(served).new_page()
+def test_no_address_outside_is_asked(
+    open_context: OpenContext, shared_server: ServerProcess
+) -> None:
+    page = open_context(shared_server).new_page()
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
     lab = LabPage(page).open("oscillator")
@@ -251,6 +255,8 @@ def test_no_address_outside_is_asked(visit: Visit, served: Served) -> None:
     expect(lab.scene.locator("canvas").first).to_be_visible()
     page.wait_for_load_state("networkidle")
     foreign = [
-        url for url in asked if not url.startswith((served.address, "data:", "blob:", "ws://127."))
+        url
+        for url in asked
+        if not url.startswith((shared_server.address, "data:", "blob:", "ws://127."))
     ]
     assert not foreign

@@ -5,17 +5,19 @@ import re
 
 from playwright.sync_api import expect
 
-from tests.browser.conftest import Visit
+from tests.browser.conftest import OpenContext
 from tests.browser.lab_page import LabPage
 from tests.path_proxy import PathProxy
-from tests.served import Served
+from tests.server_process import ServerProcess
 
 
-def test_everything_works_under_a_path(visit: Visit, served: Served) -> None:
+def test_everything_works_under_a_path(
+    open_context: OpenContext, shared_server: ServerProcess
+) -> None:
     """From the home page to a live lab with its scene, and an export."""
-    proxy = PathProxy("/user/student/proxy/8301", served.address)
+    proxy = PathProxy("/user/student/proxy/8301", shared_server.address)
     with proxy.running() as address:
-        page = visit(served).new_page()
+        page = open_context(shared_server).new_page()
         complaints: list[str] = []
         page.on("console", lambda message: complaints.append(message.text))
         page.goto(f"{address}/")

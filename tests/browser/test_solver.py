@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.conftest import Visit, screenshot
+from tests.browser.conftest import OpenContext, screenshot
 from tests.browser.lab_page import LabPage, wait_frames
 from tests.browser.test_layout import SCHEMES
-from tests.served import Served
+from tests.server_process import ServerProcess
 
 DONE = re.compile("steps done")
 WIDTHS = (360, 820, 1100, 1500)
@@ -154,10 +154,12 @@ def test_nothing_overflows_and_nothing_jumps(page: Page) -> None:
         page.get_by_role("button", name="Run the solver").click()
 
 
-def test_a_page_opened_at_the_first_start_says_what_goes_on(visit: Visit, tmp_path: Path) -> None:
+def test_a_page_opened_at_the_first_start_says_what_goes_on(
+    open_context: OpenContext, tmp_path: Path
+) -> None:
     prepared = tmp_path / "prepared"
-    with Served(wait=False, PREPARED_BY=str(prepared)) as server:
-        page = visit(server).new_page()
+    with ServerProcess(wait=False, PREPARED_BY=str(prepared)) as server:
+        page = open_context(server).new_page()
         LabPage(page, scene=False)
         page.goto("/labs/descent")
         expect(page.locator("#loading")).to_contain_text("it compiles the solvers, once")

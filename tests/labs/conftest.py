@@ -3,7 +3,7 @@
 import pytest
 
 from labs.engine.catalog import catalog
-from tests.labs.shared_runs import share
+from tests.labs.solve_cache import share_solves
 
 
 @pytest.fixture(scope="session", autouse=True)
@@ -11,4 +11,4 @@ def _shared_runs() -> None:
     """Solves once what several tests of a lab look at."""
     for entry in catalog().values():
         if entry.lab.has_solver():
-            share(type(entry.lab))
+            share_solves(type(entry.lab))

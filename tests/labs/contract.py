@@ -26,11 +26,11 @@ FAULTS = {("troublesome", "raise"), ("troublesome", "hang"), ("troublesome", "sl
 
 ENTRIES = list(catalog().values())
 
-LOOKED_AT = 12
+CHECKED_ITERATIONS = 12
 """Iterations of a solver that are looked at."""
 
 
-def extremes(entry: CatalogEntry) -> Iterator[tuple[str, Value]]:
+def extreme_values(entry: CatalogEntry) -> Iterator[tuple[str, Value]]:
     """Both ends of every knob, every option of every choice, both sides of every toggle, and of a
     text what it says by default."""
     for name, tunable in entry.lab.Params.tunables.items():
@@ -63,14 +63,14 @@ def variants(entry: CatalogEntry) -> Iterator[Mapping[str, Value]]:
     for _, changes in settings(entry):
         yield changes
     defaults = entry.lab.Params()
-    for name, value in extremes(entry):
+    for name, value in extreme_values(entry):
         is_choice = isinstance(defaults.tunables[name], Choice)
         if is_choice and defaults.acts(name) and value != getattr(defaults, name):
             yield {name: value}
 
 
 @contextmanager
-def under(what: object) -> Iterator[None]:
+def annotate_failure(what: object) -> Iterator[None]:
     """What fails within says where: many settings are tried in one test."""
     try:
         yield
@@ -86,7 +86,7 @@ class CheckingScene:
         self.drawn: set[str] = set()
 
     def camera(self, position: ArrayLike, look_at: ArrayLike, core: ArrayLike = ()) -> None:
-        assert np.linalg.norm(_point(position) - _point(look_at)) > 0.0
+        assert np.linalg.norm(_check_point(position) - _check_point(look_at)) > 0.0
 
     def arm(
         self,
@@ -117,11 +117,11 @@ class CheckingScene:
 
     def arrow(self, name: str, start: ArrayLike, end: ArrayLike, color: Color = "force") -> None:
         self._new(name, color)
-        _point(start), _point(end)
+        _check_point(start), _check_point(end)
 
     def sphere(self, name: str, center: ArrayLike, radius: float, color: Color = "actual") -> None:
         self._new(name, color)
-        _point(center)
+        _check_point(center)
         assert 0.0 < radius < np.inf
 
     def frame(self, name: str, placement: pin.SE3, length: float = 0.15) -> None:
@@ -140,8 +140,8 @@ class CheckingScene:
         color: Color = "force",
     ) -> None:
         self._new(name, color)
-        _point(center)
-        assert np.linalg.norm(_point(axis)) > 0.0, "an arc has an axis"
+        _check_point(center)
+        assert np.linalg.norm(_check_point(axis)) > 0.0, "an arc has an axis"
         assert -2 * np.pi < angle < 2 * np.pi
         assert 0.0 < radius < np.inf
 
@@ -149,18 +149,18 @@ class CheckingScene:
         self, name: str, center: ArrayLike, axes: np.ndarray, color: Color = "actual"
     ) -> None:
         self._new(name, color)
-        _point(center)
+        _check_point(center)
         assert axes.shape == (3, 3)
         assert np.isfinite(axes).all()
 
     def handle(self, name: str, position: ArrayLike, radius: float = 0.05) -> None:
         self._new(name)
-        _point(position)
+        _check_point(position)
         assert 0.0 < radius < np.inf
 
     def label(self, name: str, text: str, position: ArrayLike) -> None:
         self._new(name)
-        _point(position)
+        _check_point(position)
         assert text.strip()
 
     def cells(
@@ -173,11 +173,11 @@ class CheckingScene:
         clickable: bool = True,
     ) -> None:
         self._new(name)
-        _point(origin)
+        _check_point(origin)
         assert 0.0 < size < np.inf
         assert colors.ndim == 3
         assert min(colors.shape) >= 1, "a board has cells"
-        _colors(colors)
+        _check_colors(colors)
 
     def surface(self, name: str, points: np.ndarray, colors: np.ndarray) -> None:
         self._new(name)
@@ -186,7 +186,7 @@ class CheckingScene:
         assert points.shape[2] == 3
         assert points.shape == colors.shape
         assert np.isfinite(points).all()
-        _colors(colors)
+        _check_colors(colors)
 
     def arrows(
         self, name: str, starts: np.ndarray, ends: np.ndarray, color: Color = "force"
@@ -207,7 +207,7 @@ class CheckingScene:
     ) -> None:
         self._new(name, color if isinstance(color, str) else "actual")
         if not isinstance(color, str):
-            _colors(np.array(color))
+            _check_colors(np.array(color))
         assert 0.0 < opacity <= 1.0
         assert corners.ndim == 2
         assert corners.shape[0] >= 3, "a polygon has three corners"
@@ -231,7 +231,7 @@ class CheckingScene:
         self.drawn.add(name)
 
 
-class Offered(CheckingScene):
+class InteractionScene(CheckingScene):
     """Remembers what can be dragged and what can be clicked."""
 
     def __init__(self, world: World) -> None:
@@ -245,7 +245,7 @@ class Offered(CheckingScene):
 
     def handle(self, name: str, position: ArrayLike, radius: float = 0.05) -> None:
         super().handle(name, position, radius)
-        self.handles[name] = _tuple(_point(position))
+        self.handles[name] = _point_tuple(_check_point(position))
 
     def cells(
         self,
@@ -259,36 +259,36 @@ class Offered(CheckingScene):
         super().cells(name, origin, size, colors, clickable=clickable)
         if clickable:
             centers = cell_centers(origin, size, *colors.shape[:2]).reshape(-1, 3)
-            self.boards[name] = [_tuple(center) for center in centers]
+            self.boards[name] = [_point_tuple(center) for center in centers]
 
     @property
-    def offered(self) -> set[str]:
+    def interactive_names(self) -> set[str]:
         """The names of all of them."""
         return {*self.handles, *self.boards}
 
 
-def _tuple(point: np.ndarray) -> Point:
+def _point_tuple(point: np.ndarray) -> Point:
     x, y, z = map(float, point)
     return (x, y, z)
 
 
-def _point(value: ArrayLike) -> np.ndarray:
+def _check_point(value: ArrayLike) -> np.ndarray:
     point = np.asarray(value, dtype=float)
     assert point.shape == (3,)
     assert np.isfinite(point).all()
     return point
 
 
-def _colors(colors: np.ndarray) -> None:
+def _check_colors(colors: np.ndarray) -> None:
     assert colors.shape[-1] == 3
     assert ((colors >= 0.0) & (colors <= 1.0)).all(), "a colour lies in [0, 1]"
 
 
-def check(world: World) -> None:
+def check_world(world: World) -> None:
     """All that must hold of a world at any time."""
     lab, params, state = world.lab, world.params, world.state
     assert isinstance(state, State)
-    assert all(np.isfinite(a).all() for a in numbers(state)), "the state is finite"
+    assert all(np.isfinite(a).all() for a in arrays_of(state)), "the state is finite"
     for name, value in lab.measure(params, state).items():
         assert np.isfinite(value).all(), f"{name} is finite"
     gaps = {name for plot in lab.plots for name in plots.fields_with_gaps(plot)}
@@ -310,7 +310,7 @@ def check_sentence(sentence: str) -> None:
     assert "nan" not in sentence.lower().split(), sentence
 
 
-def numbers(value: Any) -> Iterator[np.ndarray]:
+def arrays_of(value: Any) -> Iterator[np.ndarray]:
     """Every number in plain data; anything else than plain data fails."""
     if value is None or isinstance(value, str | bool):
         return
@@ -321,23 +321,23 @@ def numbers(value: Any) -> Iterator[np.ndarray]:
             yield array
     elif is_dataclass(value) and not isinstance(value, type):
         for field in fields(value):
-            yield from numbers(getattr(value, field.name))
+            yield from arrays_of(getattr(value, field.name))
     elif isinstance(value, Mapping):
         for part in value.values():
-            yield from numbers(part)
+            yield from arrays_of(part)
     elif isinstance(value, list | tuple):
         for part in value:
-            yield from numbers(part)
+            yield from arrays_of(part)
     else:
         pytest.fail(f"{type(value).__name__} is not plain data: {value!r}")
 
 
-def same(a: Any, b: Any) -> bool:
+def bitwise_equal(a: Any, b: Any) -> bool:
     """Whether two states hold bit for bit the same."""
-    return bool(plain(a) == plain(b))
+    return bool(comparable(a) == comparable(b))
 
 
-def plain(value: Any) -> Any:
+def comparable(value: Any) -> Any:
     """Plain data as something to compare bit for bit."""
     if isinstance(value, np.ndarray):
         return (str(value.dtype), value.shape, value.tobytes())
@@ -347,20 +347,20 @@ def plain(value: Any) -> Any:
         # Durations by the wall clock are nobody's promise.
         hidden = {"seconds"} if isinstance(value, State) else set()
         names = [f.name for f in fields(value) if f.name not in hidden]
-        named = [(name, plain(getattr(value, name))) for name in names]
+        named = [(name, comparable(getattr(value, name))) for name in names]
         return (type(value).__name__, tuple(named))
     if isinstance(value, Mapping):
-        return tuple((key, plain(part)) for key, part in value.items())
+        return tuple((key, comparable(part)) for key, part in value.items())
     if isinstance(value, list | tuple):
-        return tuple(plain(part) for part in value)
+        return tuple(comparable(part) for part in value)
     return repr(value)
 
 
-def begun(
+def started_world(
     entry: CatalogEntry,
     changes: Mapping[str, Value] | None = None,
     steps: int = 3,
-    iterations: int = LOOKED_AT,
+    iterations: int = CHECKED_ITERATIONS,
 ) -> World:
     """A world after a few iterations of its solver and a few steps."""
     world = World(entry, changes, seed=1)
@@ -382,13 +382,13 @@ def advance(world: World, steps: int) -> None:
         world.advance()
 
 
-def seen(world: World) -> Any:
+def plotted_values(world: World) -> Any:
     """What a user can read off the plots, as something to compare."""
     lab, params, state = world.lab, world.params, world.state
-    return plain({"measured": lab.measure(params, state), "fields": lab.fields(params, state)})
+    return comparable({"measured": lab.measure(params, state), "fields": lab.fields(params, state)})
 
 
-def drawn(world: World) -> Any:
+def record_drawing(world: World) -> Any:
     """All that is drawn, as something to compare."""
     calls: list[Any] = []
 
@@ -397,10 +397,10 @@ def drawn(world: World) -> Any:
             return lambda *given, **named: calls.append((name, given, named))
 
     world.lab.draw(Listing(), world.params, world.state)
-    return plain(calls)
+    return comparable(calls)
 
 
-def moved(
+def advanced_world(
     entry: CatalogEntry, changes: Mapping[str, Value] | None = None, steps: int = 30
 ) -> World:
     """A world after its solver and some steps."""

@@ -11,7 +11,7 @@ import pytest
 from labs.params import Value
 
 
-class Experiments:
+class ArticleExperiments:
     """The experiments of one article, and which of them a test verifies."""
 
     def __init__(self, package: str, name: str) -> None:

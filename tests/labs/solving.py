@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.params import Value
 
@@ -13,7 +13,7 @@ Settings = Mapping[str, Value]
 
 def solved_world(slug: str, setting: Settings) -> World:
     """Of the lab of this name."""
-    world = World(find(slug), setting)
+    world = World(find_lab(slug), setting)
     solve(world)
     return world
 
@@ -29,11 +29,11 @@ def solve(world: World) -> int:
 def solve_to_convergence(world: World) -> int:
     """The same, where the solver says that it has converged."""
     iterations = solve(world)
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
     return iterations
 
 
-def done(world: World) -> str:
+def stop_reason(world: World) -> str:
     """Why the solver stopped."""
     assert world.latest is not None
     return world.latest.done

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labs.colors import STEPS, from_oklab, sequential, to_oklab
+from labs.colors import COLORMAP_SIZE, from_oklab, sequential, to_oklab
 
 
 def test_oklab_knows_its_reference_colours() -> None:
@@ -28,7 +28,7 @@ def test_oklab_and_back_is_the_same_colour() -> None:
 
 
 def test_equal_steps_of_the_value_are_equal_steps_of_colour() -> None:
-    ramp = to_oklab(sequential(np.linspace(-3.0, 5.0, STEPS)))
+    ramp = to_oklab(sequential(np.linspace(-3.0, 5.0, COLORMAP_SIZE)))
     steps = np.linalg.norm(np.diff(ramp, axis=0), axis=1)
     assert steps.max() < 1.06 * steps.min(), "a bend may cut a corner, no more"
     lightness = np.diff(ramp[:, 0])

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from labs.compiled import cache_folder, forget_stale, source_digest
+from labs.compiled import cache_folder, delete_stale_cache, source_digest
 
 ROOT = Path(__file__).parents[2]
 
@@ -81,7 +81,7 @@ def test_what_was_compiled_is_forgotten_when_a_source_changes(tmp_path: Path) ->
     def forgets() -> bool:
         (cache / "caller.f.nbi").write_text("")
         (cache / "caller.f.1.nbc").write_text("")
-        said = forget_stale(package, source_digest(package))
+        said = delete_stale_cache(package, source_digest(package))
         left = sorted(path.name for path in cache.iterdir())
         assert left == (["other.pyc"] if said else ["caller.f.1.nbc", "caller.f.nbi", "other.pyc"])
         return said

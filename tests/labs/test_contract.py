@@ -16,48 +16,48 @@ import pytest
 from labs import plots
 from labs.engine.catalog import CatalogEntry
 from labs.engine.events import Event
-from labs.engine.headless import run
+from labs.engine.headless import run_headless
 from labs.engine.run import World
 from labs.engine.snapshots import flatten
-from labs.engine.solution import FORMS, Solution
+from labs.engine.solution import FILE_FORMATS, Solution
 from labs.errors import ParameterError
 from labs.lab import Action, Inputs, Snapshot, State
 from labs.params import Choice, Knob, Params, Text, Toggle, Value
 from labs.plots import Bars, Curves, HeatMap, Matrix, Note, Readout, TimeSeries, Trace
 from server.articles import render
-from server.formulas import tex
+from server.formulas import tex_to_mathml
 from tests.labs.contract import (
+    CHECKED_ITERATIONS,
     ENTRIES,
-    LOOKED_AT,
     CheckingScene,
-    Offered,
+    InteractionScene,
     Point,
     advance,
-    begun,
-    check,
-    drawn,
-    extremes,
+    advanced_world,
+    annotate_failure,
+    arrays_of,
+    bitwise_equal,
+    check_world,
+    extreme_values,
     iterate,
-    moved,
-    numbers,
-    same,
-    seen,
+    plotted_values,
+    record_drawing,
     settings,
-    under,
+    started_world,
     variants,
 )
-from tests.labs.shared_runs import anew
+from tests.labs.solve_cache import sharing_disabled
 
 SECONDS = 1.0
 """Simulated for each preset and each experiment."""
-BRIEFLY = 0.24
+BRIEF_SECONDS = 0.24
 """Simulated for each end of each knob, each option, and each corner."""
-BEGINNING = 2
+BRIEF_ITERATIONS = 2
 """Iterations of a solver for each of these, from its guess and from what it found; the presets and
 experiments are solved to the end."""
-FAR = LOOKED_AT
+CORNER_ITERATIONS = CHECKED_ITERATIONS
 """Iterations for each corner."""
-CORNERS = {True: 4, False: 20}
+CORNER_COUNTS = {True: 4, False: 20}
 """All tunables at an extreme at once, so many times; fewer for labs with a solver."""
 SETTINGS_OF_A_HANDLE = 3
 """In as many of those that offer it, each is dragged."""
@@ -98,7 +98,7 @@ def test_every_parameter_is_documented(entry: CatalogEntry) -> None:
         assert tunable.help.endswith("."), f"{name}: help is a sentence"
         assert tunable.label.strip(), f"{name} has a label"
         if tunable.symbol:
-            tex(tunable.symbol)
+            tex_to_mathml(tunable.symbol)
         match tunable:
             case Knob():
                 assert tunable.symbol, f"{name}: a knob has a symbol"
@@ -124,28 +124,28 @@ def test_what_is_said_not_to_act_changes_nothing(entry: CatalogEntry) -> None:
         for choices in tunable.when
         for governor in choices
     }
-    tried = [{}, *({name: value} for name, value in extremes(entry) if name in governors)]
+    tried = [{}, *({name: value} for name, value in extreme_values(entry) if name in governors)]
     known: list[set[str]] = [set()]
     for changes in tried:
         params = entry.lab.Params().change(changes)
         idle = {name: other(entry, name) for name in params.tunables if not params.acts(name)}
         if set(idle) not in known:
             known.append(set(idle))
-            with under((changes, idle)):
+            with annotate_failure((changes, idle)):
                 twin, world = (World(entry, {**more, **changes}) for more in ({}, idle))
                 for each in (twin, world):
                     iterate(each, 3)
                     advance(each, 5)
                     each.state = replace(each.state, seconds={})
-                assert seen(world) == seen(twin)
-                assert drawn(world) == drawn(twin)
+                assert plotted_values(world) == plotted_values(twin)
+                assert record_drawing(world) == record_drawing(twin)
 
 
 def other(entry: CatalogEntry, name: str) -> Value:
     """Some value that is not the default."""
     default = getattr(entry.lab.Params(), name)
     ready = [dict(values)[name] for _, values in settings(entry) if name in values]
-    values = [value for tried, value in extremes(entry) if tried == name]
+    values = [value for tried, value in extreme_values(entry) if tried == name]
     return next((value for value in values + ready if value != default), default)
 
 
@@ -169,7 +169,7 @@ def test_settings_that_go_with_a_choice_are_valid(entry: CatalogEntry) -> None:
 def test_parameters_survive_as_text(entry: CatalogEntry) -> None:
     """A link and a command line hold every extreme value exactly."""
     params = entry.lab.Params
-    for name, value in extremes(entry):
+    for name, value in extreme_values(entry):
         text = str(value).lower() if isinstance(value, bool) else str(value)
         read = params.read({name: text})
         assert getattr(params().change(read), name) == value
@@ -177,9 +177,9 @@ def test_parameters_survive_as_text(entry: CatalogEntry) -> None:
 
 @pytest.mark.parametrize(("entry", "changes"), SETTINGS)
 def test_presets_and_experiments_run(entry: CatalogEntry, changes: dict[str, Value]) -> None:
-    world = run(entry.slug, changes, seconds=SECONDS)
+    world = run_headless(entry.slug, changes, seconds=SECONDS)
     assert {name: getattr(world.params, name) for name in changes} == changes
-    check(world)
+    check_world(world)
 
 
 @every_lab
@@ -187,7 +187,7 @@ def test_an_experiment_predicts_what_is_measured_and_compares_with_what_runs(
     entry: CatalogEntry,
 ) -> None:
     for experiment in render(entry).experiments:
-        with under(experiment.title):
+        with annotate_failure(experiment.title):
             world = World(entry, experiment.settings)
             channel = getattr(experiment.predict, "channel", "")
             assert not channel or channel in world.recorder.columns
@@ -209,7 +209,7 @@ def test_names_do_not_collide(entry: CatalogEntry) -> None:
     assert len(titles) == len(set(titles))
     # These are keys beside the channels in exports, commands and on the command line.
     reserved = {"t", "lab", "seed", "trouble", "solver", "about"}
-    assert not reserved & set(moved(entry).recorder.columns[1:])
+    assert not reserved & set(advanced_world(entry).recorder.columns[1:])
     assert not {"press", "hold", "iterate", "show"} & set(lab.Params.tunables)
 
 
@@ -224,7 +224,7 @@ def iterated(entry: CatalogEntry) -> tuple[World, list[State]]:
     """A world after some iterations, and the state after each."""
     world = World(entry)
     states: list[State] = []
-    while world.solving and len(states) < LOOKED_AT:
+    while world.solving and len(states) < CHECKED_ITERATIONS:
         world.iterate()
         states.append(copy.deepcopy(replace(world.state, seconds={})))
     return world, states
@@ -237,7 +237,7 @@ def test_looking_back_shows_what_was(entry: CatalogEntry) -> None:
     for i in (*reversed(range(len(states))), 0, len(states) - 1):
         for _ in range(2):
             world.show(world.snapshots.iterations[i])
-            assert same(replace(world.state, seconds={}), states[i]), f"iteration {i + 1}"
+            assert bitwise_equal(replace(world.state, seconds={}), states[i]), f"iteration {i + 1}"
 
 
 @solvers
@@ -258,29 +258,29 @@ def test_a_snapshot_is_plain_deterministic_and_never_written_into(entry: Catalog
         copy.deepcopy(_without_durations(world.snapshots.at(i))) for i in world.snapshots.iterations
     ]
     advance(world, 20)
-    with anew():
+    with sharing_disabled():
         again, _ = iterated(entry)
     for i, was in zip(world.snapshots.iterations, before, strict=True):
-        assert all(np.isfinite(a).all() for a in numbers(was)), "a snapshot is finite"
-        assert same(_without_durations(world.snapshots.at(i)), was)
-        assert same(_without_durations(again.snapshots.at(i)), was)
+        assert all(np.isfinite(a).all() for a in arrays_of(was)), "a snapshot is finite"
+        assert bitwise_equal(_without_durations(world.snapshots.at(i)), was)
+        assert bitwise_equal(_without_durations(again.snapshots.at(i)), was)
         assert not {"about", "file"} & {name for name, _ in flatten(was)}, "names of the files"
 
 
 @solvers
 def test_a_solution_is_saved_and_taken_up_again(entry: CatalogEntry) -> None:
-    for form in FORMS:
+    for form in FILE_FORMATS:
         found, _ = iterated(entry)
         world = World(entry, solution=Solution.read(found.solution().write(form)))
-        with under(form):
-            assert same(replace(world.state, seconds={}), replace(found.state, seconds={}))
-            check(world)
+        with annotate_failure(form):
+            assert bitwise_equal(replace(world.state, seconds={}), replace(found.state, seconds={}))
+            check_world(world)
             assert world.latest is not None
             assert found.latest is not None
             assert world.latest.iteration == found.latest.iteration
             if world.solving:
                 world.iterate()
-                check(world)
+                check_world(world)
 
 
 def _without_durations(snapshot: Snapshot | None) -> dict[str, Any]:
@@ -295,7 +295,9 @@ def _without_durations(snapshot: Snapshot | None) -> dict[str, Any]:
 def test_plots_name_real_channels(entry: CatalogEntry) -> None:
     """Of every plot where it is shown."""
     unseen = set(range(len(entry.lab.plots)))
-    for world in chain([moved(entry)], (World(entry, changes) for changes in variants(entry))):
+    for world in chain(
+        [advanced_world(entry)], (World(entry, changes) for changes in variants(entry))
+    ):
         if not unseen:
             return
         params = world.params.model_dump()
@@ -330,7 +332,7 @@ def check_plots(world: World, shown: list[plots.Plot]) -> None:
                 assert len(vectors) <= 1, f"{plot}: its vectors have one size"
                 assert bool(select) == bool(vectors), f"{plot}: vectors and only they are selected"
                 for line in lines:
-                    tex(line.symbol)
+                    tex_to_mathml(line.symbol)
                 assert unit == unit.strip()
             case Curves(traces=traces, log_x=log_x, log_y=log_y, equal=equal):
                 there = [t for t in traces if not t.optional or {t.x, t.y} & set(known)]
@@ -347,11 +349,13 @@ def check_plots(world: World, shown: list[plots.Plot]) -> None:
                         assert "{" in trace.label or not trace.label, trace
                     if trace.note:
                         assert len(pictured[trace.note]) in {0, *(y.shape[1:] or (1,))}, trace
-                labels = [name for trace in traces for name in named(trace)]
+                labels = [name for trace in traces for name in trace_labels(trace)]
                 assert labels or len(traces) == 1, f"{plot}: a legend names what is drawn"
                 assert len(labels) == len(set(labels)), plot
                 pairs = combinations((t for t in there if t.label), 2)
-                assert not [p for p in pairs if set.intersection(*(looks(t, pictured) for t in p))]
+                assert not [
+                    p for p in pairs if set.intersection(*(curve_style(t, pictured) for t in p))
+                ]
                 assert not (equal and (log_x or log_y)), f"{plot}: one scale is linear"
             case HeatMap(x=x, y=y, z=z, arrows=arrows):
                 assert np.shape(pictured[z]) == (len(pictured[y]), len(pictured[x]))
@@ -361,14 +365,14 @@ def check_plots(world: World, shown: list[plots.Plot]) -> None:
                     assert np.linalg.norm(ways[:, 2:], axis=1).max(initial=0.0) <= 1.0 + 1e-9
             case Matrix(field=name, symbol=symbol):
                 assert np.ndim(pictured[name]) == 2
-                tex(symbol)
+                tex_to_mathml(symbol)
             case Bars(field=name, symbol=symbol, limit=limit, marks=marks):
                 assert np.ndim(pictured[name]) == 1
                 if limit:
                     assert np.shape(pictured[limit]) == np.shape(pictured[name])
                 if marks:
                     assert np.shape(pictured[marks]) in {np.shape(pictured[name]), (0,)}
-                tex(symbol)
+                tex_to_mathml(symbol)
             case Readout(channel=channel, label=label):
                 assert label
                 assert np.ndim(measured.get(channel, 0.0)) == 0, "a read-out is one number"
@@ -380,7 +384,7 @@ def optional_fields(plot: plots.Plot) -> set[str]:
     return {name for trace in traces if trace.optional for name in (trace.x, trace.y)}
 
 
-def looks(trace: Trace, pictured: Mapping[str, np.ndarray]) -> set[tuple[str, int]]:
+def curve_style(trace: Trace, pictured: Mapping[str, np.ndarray]) -> set[tuple[str, int]]:
     """What tells its curves from others': style and colour, 0 for ink."""
     y = np.asarray(pictured[trace.y])
     curves = y.shape[1] if y.ndim == 2 else 1
@@ -414,7 +418,7 @@ def test_labels_fit_what_they_name_whatever_is_chosen(entry: CatalogEntry) -> No
                 assert word == word.strip(), (words, changes)
 
 
-def named(trace: Trace) -> tuple[str, ...]:
+def trace_labels(trace: Trace) -> tuple[str, ...]:
     """The labels of a trace in the legend."""
     labels = trace.label if isinstance(trace.label, tuple) else (trace.label,)
     return tuple(filter(None, labels))
@@ -423,14 +427,14 @@ def named(trace: Trace) -> tuple[str, ...]:
 @every_lab
 def test_every_channel_is_measured_somewhere(entry: CatalogEntry) -> None:
     """A misspelt one would never show a value, whatever is set."""
-    wanted = {name for plot in entry.lab.plots for name in plots.measured(plot)}
+    wanted = {name for plot in entry.lab.plots for name in plots.channel_names(plot)}
     optional = {name for plot in entry.lab.plots for name in optional_fields(plot)}
     wanted |= optional
     found: set[str] = set()
     for changes in ({}, *(values for _, values in settings(entry))):
         if wanted <= found:
             break
-        world = run(entry.slug, changes, seconds=5.0)
+        world = run_headless(entry.slug, changes, seconds=5.0)
         channels = world.recording().channels
         found |= {name for name in wanted - optional if np.isfinite(channels[name]).any()}
         found |= optional & set(entry.lab.fields(world.params, world.state))
@@ -441,7 +445,7 @@ def test_every_channel_is_measured_somewhere(entry: CatalogEntry) -> None:
 def test_channels_keep_their_shape_and_stay_finite(entry: CatalogEntry) -> None:
     world = World(entry)
     lab = entry.lab
-    optional = {name for plot in lab.plots for name in plots.measured(plot)}
+    optional = {name for plot in lab.plots for name in plots.channel_names(plot)}
     first = lab.measure(world.params, world.state)
     shapes = {name: np.shape(value) for name, value in first.items()}
     for _ in range(round(3.0 / lab.period) if lab.has_world() else 1):
@@ -456,10 +460,12 @@ def test_channels_keep_their_shape_and_stay_finite(entry: CatalogEntry) -> None:
 # Extremes -------------------------------------------------------------------------------------
 
 
-def brief(entry: CatalogEntry, changes: Mapping[str, Value], iterations: int = BEGINNING) -> World:
+def brief(
+    entry: CatalogEntry, changes: Mapping[str, Value], iterations: int = BRIEF_ITERATIONS
+) -> World:
     """A short run that the solver has only begun."""
     events = [Event(0, "solve", "iterate", iterations)] if entry.lab.has_solver() else []
-    return run(entry.slug, changes, seconds=BRIEFLY, events=events)
+    return run_headless(entry.slug, changes, seconds=BRIEF_SECONDS, events=events)
 
 
 @every_lab
@@ -467,29 +473,31 @@ def test_every_tunable_starts_at_one_extreme_and_changes_to_the_others(entry: Ca
     """Each that acts by default, while the others stand still: a run that begins at one of its
     extremes, now the first and now the last, goes on through the others to its default."""
     lab = entry.lab
-    acting = {name: values for name, values in ends(entry).items() if lab.Params().acts(name)}
+    acting = {
+        name: values for name, values in tunable_extremes(entry).items() if lab.Params().acts(name)
+    }
     for i, (name, values) in enumerate(acting.items()):
         first, *others = values if i % 2 else values[::-1]
-        with under({name: first}):
+        with annotate_failure({name: first}):
             world = brief(entry, {name: first})
-            check(world)
+            check_world(world)
             if not world.trouble and lab.has_world():
-                assert world.t == pytest.approx(BRIEFLY, abs=lab.period / 2)
+                assert world.t == pytest.approx(BRIEF_SECONDS, abs=lab.period / 2)
         for value in (*others, getattr(lab.Params(), name)):
-            with under({name: value}):
+            with annotate_failure({name: value}):
                 world.change({name: value})
                 if world.trouble:
                     world.reset()
-                iterate(world, BEGINNING)
+                iterate(world, BRIEF_ITERATIONS)
                 advance(world, 3)
                 assert getattr(world.params, name) == value
-                check(world)
+                check_world(world)
 
 
 @every_lab
 def test_what_acts_under_a_choice_runs_at_its_extremes_there(entry: CatalogEntry) -> None:
     """All that act under the same choices at once: first at one end, then through the others."""
-    lab, options = entry.lab, ends(entry)
+    lab, options = entry.lab, tunable_extremes(entry)
     governed: dict[tuple[tuple[str, Value], ...], list[str]] = {}
     for name, tunable in lab.Params.tunables.items():
         if not lab.Params().acts(name):
@@ -500,19 +508,19 @@ def test_what_acts_under_a_choice_runs_at_its_extremes_there(entry: CatalogEntry
         assert all(world.params.acts(name) for name in names), choices
         for i in range(max(len(options[name]) for name in names)):
             changes = {name: options[name][i % len(options[name])] for name in names}
-            with under((choices, changes)):
+            with annotate_failure((choices, changes)):
                 world.change(changes)
                 if world.trouble:
                     world.reset()
-                iterate(world, BEGINNING)
-                advance(world, round(BRIEFLY / lab.period))
-                check(world)
+                iterate(world, BRIEF_ITERATIONS)
+                advance(world, round(BRIEF_SECONDS / lab.period))
+                check_world(world)
 
 
-def ends(entry: CatalogEntry) -> dict[str, list[Value]]:
+def tunable_extremes(entry: CatalogEntry) -> dict[str, list[Value]]:
     """The extremes of each tunable."""
     found: dict[str, list[Value]] = {}
-    for name, value in extremes(entry):
+    for name, value in extreme_values(entry):
         found.setdefault(name, []).append(value)
     return found
 
@@ -520,31 +528,31 @@ def ends(entry: CatalogEntry) -> dict[str, list[Value]]:
 @every_lab
 def test_random_corners_run(entry: CatalogEntry) -> None:
     """All tunables at an extreme at once."""
-    options = ends(entry)
+    options = tunable_extremes(entry)
     rng = np.random.default_rng(0)
-    for _ in range(CORNERS[entry.lab.has_solver()]):
+    for _ in range(CORNER_COUNTS[entry.lab.has_solver()]):
         changes = {name: values[rng.integers(len(values))] for name, values in options.items()}
-        with under(changes):
-            check(brief(entry, changes, FAR))
+        with annotate_failure(changes):
+            check_world(brief(entry, changes, CORNER_ITERATIONS))
 
 
 # Actions and handles --------------------------------------------------------------------------
 
 
 @functools.cache
-def offers(entry: CatalogEntry) -> list[tuple[Mapping[str, Value], Offered]]:
+def interaction_settings(entry: CatalogEntry) -> list[tuple[Mapping[str, Value], InteractionScene]]:
     """In which settings what can be dragged or clicked."""
     found = []
     for changes in variants(entry):
-        with under(changes):
-            found.append((changes, Offered(begun(entry, changes, iterations=1))))
+        with annotate_failure(changes):
+            found.append((changes, InteractionScene(started_world(entry, changes, iterations=1))))
     return found
 
 
 @every_lab
 def test_handles_are_declared(entry: CatalogEntry) -> None:
     """Every one that is drawn in some setting, and no other."""
-    drawn = set().union(*(offered.offered for _, offered in offers(entry)))
+    drawn = set().union(*(offered.interactive_names for _, offered in interaction_settings(entry)))
     for name in drawn:
         entry.lab.check_handle(name)
     for handle in entry.lab.handles:
@@ -557,43 +565,47 @@ def test_every_handle_that_is_drawn_acts(entry: CatalogEntry) -> None:
     """Dragged by a little and out of the picture both ways, beside a twin that is left alone; in
     the first settings that offer it."""
     tried: Counter[str] = Counter()
-    for changes, offered in offers(entry):
+    for changes, offered in interaction_settings(entry):
         for name, (x, y, z) in offered.handles.items():
             tried[name] += 1
             if tried[name] > SETTINGS_OF_A_HANDLE:
                 continue
-            visible, twin = False, begun(entry, changes, iterations=2)
+            visible, twin = False, started_world(entry, changes, iterations=2)
             advance(twin, 5)
             for offset in (0.1, 1000.0, -1000.0):
-                with under((changes, name, offset)):
-                    world = begun(entry, changes, iterations=2)
+                with annotate_failure((changes, name, offset)):
+                    world = started_world(entry, changes, iterations=2)
                     world.hold(name, (x + offset, y + offset, z + offset))
                     advance(world, 5)
-                    check(world)
-                    assert world.params != twin.params or not same(world.state, twin.state)
-                    visible |= world.params != twin.params or seen(world) != seen(twin)
+                    check_world(world)
+                    assert world.params != twin.params or not bitwise_equal(world.state, twin.state)
+                    visible |= world.params != twin.params or plotted_values(
+                        world
+                    ) != plotted_values(twin)
                     world.hold(name, None)
                     advance(world, 1)
-                    check(world)
+                    check_world(world)
             assert visible, f"{name} moves something with {changes}"
 
 
 @every_lab
 def test_every_board_that_is_drawn_acts(entry: CatalogEntry) -> None:
     """A click in one of its cells changes a parameter, at the latest after others were clicked."""
-    for changes, offered in offers(entry):
+    for changes, offered in interaction_settings(entry):
         if not offered.boards:
             continue
-        world, acted = begun(entry, changes), set()
+        world, acted = started_world(entry, changes), set()
         for name, cells in [*offered.boards.items(), *offered.boards.items()]:
-            with under((changes, name)):
-                if name not in acted and any(clicked(world, name, cell) for cell in cells):
+            with annotate_failure((changes, name)):
+                if name not in acted and any(
+                    click_changes_params(world, name, cell) for cell in cells
+                ):
                     acted.add(name)
-                    check(world)
+                    check_world(world)
         assert acted == set(offered.boards), changes
 
 
-def clicked(world: World, board: str, cell: Point) -> bool:
+def click_changes_params(world: World, board: str, cell: Point) -> bool:
     """Whether a click changes a parameter; one that is refused does not."""
     before = world.params
     with contextlib.suppress(ParameterError):
@@ -607,16 +619,18 @@ def test_every_action_acts(entry: CatalogEntry) -> None:
     """In some setting, if need be after a drag, within some steps, beside a twin left alone."""
     for action in entry.lab.actions:
         assert any(
-            acts(entry, changes, action, dragged)
+            action_has_effect(entry, changes, action, dragged)
             for changes in variants(entry)
             for dragged in (False, True)
         ), f"{action.name} changes something"
 
 
-def acts(entry: CatalogEntry, changes: Mapping[str, Value], action: Action, dragged: bool) -> bool:
+def action_has_effect(
+    entry: CatalogEntry, changes: Mapping[str, Value], action: Action, dragged: bool
+) -> bool:
     """Whether what is seen differs within half a second after it was pressed."""
-    world, twin = begun(entry, changes, 20), begun(entry, changes, 20)
-    for name, (x, y, z) in Offered(twin).handles.items() if dragged else ():
+    world, twin = started_world(entry, changes, 20), started_world(entry, changes, 20)
+    for name, (x, y, z) in InteractionScene(twin).handles.items() if dragged else ():
         for each in (world, twin):
             each.hold(name, (x + 0.1, y + 0.1, z + 0.1))
             advance(each, 1)
@@ -625,8 +639,8 @@ def acts(entry: CatalogEntry, changes: Mapping[str, Value], action: Action, drag
     for _ in range(50):
         advance(world, 1)
         advance(twin, 1)
-        check(world)
-        if seen(world) != seen(twin):
+        check_world(world)
+        if plotted_values(world) != plotted_values(twin):
             return True
     return False
 
@@ -639,7 +653,7 @@ def test_nothing_can_be_done_only_where_it_is_said() -> None:
 # Determinism and plain data -------------------------------------------------------------------
 
 
-def _eventful(entry: CatalogEntry) -> list[Event]:
+def _all_events(entry: CatalogEntry) -> list[Event]:
     """Every action pressed, and every live knob moved, one after the other."""
     events = [Event(5 + i, "press", action.name) for i, action in enumerate(entry.lab.actions)]
     for i, (name, tunable) in enumerate(entry.lab.Params.tunables.items()):
@@ -648,7 +662,7 @@ def _eventful(entry: CatalogEntry) -> list[Event]:
     return events if entry.lab.has_world() else []
 
 
-def _noisy(entry: CatalogEntry) -> dict[str, Value]:
+def _with_noise(entry: CatalogEntry) -> dict[str, Value]:
     """Noise on, where a lab has any."""
     changes: dict[str, Value] = {}
     for name, tunable in entry.lab.Params.tunables.items():
@@ -659,25 +673,33 @@ def _noisy(entry: CatalogEntry) -> dict[str, Value]:
 
 @every_lab
 def test_the_same_seed_and_events_give_the_same_run(entry: CatalogEntry) -> None:
-    a = run(entry.slug, _noisy(entry), seconds=SECONDS, seed=3, events=_eventful(entry))
-    with anew():
-        b = run(entry.slug, _noisy(entry), seconds=SECONDS, seed=3, events=_eventful(entry))
+    a = run_headless(
+        entry.slug, _with_noise(entry), seconds=SECONDS, seed=3, events=_all_events(entry)
+    )
+    with sharing_disabled():
+        b = run_headless(
+            entry.slug, _with_noise(entry), seconds=SECONDS, seed=3, events=_all_events(entry)
+        )
     assert a.recording().rows.tobytes() == b.recording().rows.tobytes()
-    assert same(a.state, b.state)
+    assert bitwise_equal(a.state, b.state)
 
 
-@pytest.mark.parametrize("entry", [e for e in ENTRIES if _noisy(e)], ids=lambda entry: entry.slug)
+@pytest.mark.parametrize(
+    "entry", [e for e in ENTRIES if _with_noise(e)], ids=lambda entry: entry.slug
+)
 def test_another_seed_gives_another_run_where_there_is_noise(entry: CatalogEntry) -> None:
-    a, b = (run(entry.slug, _noisy(entry), seconds=SECONDS, seed=seed) for seed in (3, 4))
+    a, b = (
+        run_headless(entry.slug, _with_noise(entry), seconds=SECONDS, seed=seed) for seed in (3, 4)
+    )
     assert a.recording().rows.tobytes() != b.recording().rows.tobytes()
 
 
 @every_lab
 def test_runs_do_not_disturb_each_other(entry: CatalogEntry) -> None:
     """Two worlds of one lab, stepped in turns, go as each alone: no state hides in the lab."""
-    alone = moved(entry, _noisy(entry), steps=40)
-    with anew():
-        one, other = World(entry, _noisy(entry), seed=1), World(entry, seed=2)
+    alone = advanced_world(entry, _with_noise(entry), steps=40)
+    with sharing_disabled():
+        one, other = World(entry, _with_noise(entry), seed=1), World(entry, seed=2)
         for world in (one, other):
             while world.solving:
                 world.iterate()
@@ -685,24 +707,24 @@ def test_runs_do_not_disturb_each_other(entry: CatalogEntry) -> None:
         other.advance()
         one.advance()
         other.lab.fields(other.params, other.state)
-    assert same(one.state, alone.state)
+    assert bitwise_equal(one.state, alone.state)
 
 
 @every_lab
 def test_a_copied_state_continues_the_same(entry: CatalogEntry) -> None:
-    world = moved(entry, _noisy(entry))
+    world = advanced_world(entry, _with_noise(entry))
     copies = [copy.deepcopy(world.state), pickle.loads(pickle.dumps(world.state))]  # noqa: S301
     ends = []
     for state in (world.state, *copies):
         for _ in range(20 if entry.lab.has_world() else 0):
             state = world.lab.step(world.params, Inputs(), state)
         ends.append(state)
-    assert all(same(end, ends[0]) for end in ends[1:])
+    assert all(bitwise_equal(end, ends[0]) for end in ends[1:])
 
 
 @every_lab
 def test_a_step_leaves_the_old_state_alone(entry: CatalogEntry) -> None:
-    world = moved(entry, _noisy(entry))
+    world = advanced_world(entry, _with_noise(entry))
     lab, params, old = world.lab, world.params, world.state
     before = copy.deepcopy(old)
     if lab.has_world():
@@ -712,7 +734,7 @@ def test_a_step_leaves_the_old_state_alone(entry: CatalogEntry) -> None:
     lab.measure(params, old)
     lab.fields(params, old)
     lab.draw(CheckingScene(), params, old)
-    assert same(old, before)
+    assert bitwise_equal(old, before)
 
 
 @pytest.mark.parametrize(
@@ -727,7 +749,7 @@ def test_a_solver_ends_with_a_reason_and_accepting_leaves_the_old_state_alone(
         snapshots.append(snapshot)
         before = copy.deepcopy(world.state)
         after = lab.accept(world.params, world.state, snapshot)
-        assert same(world.state, before)
+        assert bitwise_equal(world.state, before)
         world.state = after
     assert [s.iteration for s in snapshots] == list(range(1, len(snapshots) + 1))
     assert [bool(s.done) for s in snapshots] == [False] * (len(snapshots) - 1) + [True]
@@ -735,12 +757,12 @@ def test_a_solver_ends_with_a_reason_and_accepting_leaves_the_old_state_alone(
 
 @every_lab
 def test_a_world_in_trouble_stays_where_it_was(entry: CatalogEntry) -> None:
-    world = moved(entry)
+    world = advanced_world(entry)
     world.state = copy.deepcopy(world.state)
     world.state.trouble = "It went wrong: change something."
     before, t = copy.deepcopy(world.state), world.t
     world.advance()
-    assert same(world.state, before)
+    assert bitwise_equal(world.state, before)
     assert world.t == t
 
 
@@ -749,15 +771,15 @@ def test_a_world_in_trouble_stays_where_it_was(entry: CatalogEntry) -> None:
 
 def test_states_that_differ_in_one_bit_differ() -> None:
     one, other = State(t=1.0), State(t=float(np.nextafter(1.0, 2.0)))
-    assert same(one, State(t=1.0))
-    assert not same(one, other)
-    assert not same({"a": np.zeros(3)}, {"a": np.array([0.0, 0.0, -0.0])})
+    assert bitwise_equal(one, State(t=1.0))
+    assert not bitwise_equal(one, other)
+    assert not bitwise_equal({"a": np.zeros(3)}, {"a": np.array([0.0, 0.0, -0.0])})
 
 
 @pytest.mark.parametrize("bad", [object(), {1: [object()]}, np.array([object()])])
 def test_what_is_not_plain_data_is_refused(bad: object) -> None:
     with pytest.raises((pytest.fail.Exception, AssertionError)):
-        list(numbers(bad))
+        list(arrays_of(bad))
 
 
 def test_the_suite_sees_shipped_and_sample_labs() -> None:

@@ -13,18 +13,18 @@ from labs.params import Choice, Knob, Text, Tunable, Value
 from tests.labs.contract import (
     ENTRIES,
     FAULTS,
-    Offered,
+    InteractionScene,
     advance,
-    check,
+    annotate_failure,
     check_sentence,
+    check_world,
     iterate,
     settings,
-    under,
 )
 
 SHORT, LONG = 150, 1000
 """Operations of a session in every run of the tests, and in a study."""
-CHANCES = {
+OPERATION_WEIGHTS = {
     "change": 0.4,
     "advance": 0.2,
     "iterate": 0.15,
@@ -34,11 +34,11 @@ CHANCES = {
     "show": 0.04,
     "reset": 0.02,
 }
-TOLD = 15
+LOG_LENGTH = 15
 """Operations before a failure that it tells."""
 
 
-class Session:
+class RandomSession:
     """A world and somebody who plays with it."""
 
     def __init__(self, entry: CatalogEntry, seed: int) -> None:
@@ -48,18 +48,18 @@ class Session:
 
     def __str__(self) -> str:
         """What was done last."""
-        return f"{len(self.log)} operations: {'; '.join(self.log[-TOLD:])}"
+        return f"{len(self.log)} operations: {'; '.join(self.log[-LOG_LENGTH:])}"
 
     def operate(self) -> None:
         """One thing at random; a refusal is a sentence."""
-        kind = str(self.rng.choice(list(CHANCES), p=list(CHANCES.values())))
+        kind = str(self.rng.choice(list(OPERATION_WEIGHTS), p=list(OPERATION_WEIGHTS.values())))
         if self.world.trouble and self.rng.random() < 0.3:
             kind = "reset"  # trouble waits for it
         try:
             getattr(self, f"_{kind}")()
         except LabError as error:
             check_sentence(f"{str(error)[:1].upper()}{str(error)[1:].rstrip('.')}.")
-        check(self.world)
+        check_world(self.world)
 
     def _note(self, text: str) -> None:
         self.log.append(text)
@@ -111,8 +111,8 @@ class Session:
             self.world.press(name)
 
     def _drag(self) -> None:
-        offered = Offered(self.world)
-        names = sorted(offered.offered)
+        offered = InteractionScene(self.world)
+        names = sorted(offered.interactive_names)
         if not names:
             return
         name = names[self.rng.integers(len(names))]
@@ -141,8 +141,8 @@ class Session:
 
 def play(entry: CatalogEntry, seed: int, operations: int) -> None:
     """A session of so many operations."""
-    session = Session(entry, seed)
-    with under(session):
+    session = RandomSession(entry, seed)
+    with annotate_failure(session):
         for _ in range(operations):
             session.operate()
 

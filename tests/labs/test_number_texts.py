@@ -4,11 +4,17 @@ import pytest
 
 from labs.algorithms.butcher_tableau import parse_tableau
 from labs.errors import LabError
-from labs.number_texts import LONGEST_NUMBER, counted, parse_number, plain_text, with_minus
+from labs.number_texts import (
+    MAX_NUMBER_LENGTH,
+    count_text,
+    parse_number,
+    strip_comments,
+    with_minus_signs,
+)
 from labs.reinforcement_learning.markov.chains import parse_rows
 from labs.tasks.mdp_table.table import parse_table
 
-ENDLESS = ["1e9000000", "1e-9000000/1e9000000", "1/1e9000000", "9" * 300, "0." + "3" * 300]
+HUGE_NUMBERS = ["1e9000000", "1e-9000000/1e9000000", "1/1e9000000", "9" * 300, "0." + "3" * 300]
 """What exact arithmetic would need minutes for, or what no number is that long."""
 
 
@@ -22,7 +28,7 @@ ENDLESS = ["1e9000000", "1e-9000000/1e9000000", "1/1e9000000", "9" * 300, "0." +
         ("\u22122", -2.0),
         ("25 %", 0.25),
         ("1/4%", 0.0025),
-        ("0." + "3" * (LONGEST_NUMBER - 2), 1 / 3),
+        ("0." + "3" * (MAX_NUMBER_LENGTH - 2), 1 / 3),
     ],
 )
 def test_a_number_is_read(text: str, value: float) -> None:
@@ -31,7 +37,21 @@ def test_a_number_is_read(text: str, value: float) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    [*ENDLESS, "", "x", "1/0", "1/2/3", "nan", "inf", "1/inf", "1_0", "%", "5%%", "1e400", "0x10"],
+    [
+        *HUGE_NUMBERS,
+        "",
+        "x",
+        "1/0",
+        "1/2/3",
+        "nan",
+        "inf",
+        "1/inf",
+        "1_0",
+        "%",
+        "5%%",
+        "1e400",
+        "0x10",
+    ],
 )
 def test_what_is_no_number_is_refused_at_once_and_shown_in_short(text: str) -> None:
     with pytest.raises(ValueError, match="is no number: write") as refused:
@@ -49,10 +69,10 @@ def test_what_is_no_number_is_refused_at_once_and_shown_in_short(text: str) -> N
     ],
 )
 def test_comments_are_left_out_and_per_cent_signs_kept(text: str, plain: str) -> None:
-    assert plain_text(text) == plain
+    assert strip_comments(text) == plain
 
 
-@pytest.mark.parametrize("number", ENDLESS)
+@pytest.mark.parametrize("number", HUGE_NUMBERS)
 def test_no_text_of_a_lab_is_read_at_unbounded_cost(number: str) -> None:
     """Each of these is refused in microseconds; exact arithmetic would run into the time limit."""
     with pytest.raises(LabError):
@@ -77,12 +97,12 @@ def test_no_text_of_a_lab_is_read_at_unbounded_cost(number: str) -> None:
     ],
 )
 def test_numbers_have_the_sign_of_mathematics(text: str, shown: str) -> None:
-    assert with_minus(text) == shown
+    assert with_minus_signs(text) == shown
 
 
 def test_one_is_no_plural() -> None:
     counts = (0, 1, 2, 1024)
-    assert [counted(n, "sweep") for n in counts] == [
+    assert [count_text(n, "sweep") for n in counts] == [
         "0 sweeps",
         "1 sweep",
         "2 sweeps",

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from labs.errors import ParameterError
-from labs.params import Group, Knob, Params, When
-from labs.tunables import LOG_SPAN, LONGEST_TEXT, Scale
+from labs.params import Condition, Group, Knob, Params
+from labs.tunables import LOG_SPAN, MAX_TEXT_LENGTH, Scale
 
 KNOBS = Group()
 
@@ -71,12 +71,12 @@ def test_position_inverts_at(k: Knob, position: float) -> None:
         grain = 10.0 ** math.floor(math.log10((k.high - k.low) / 200))
         shift = 0.501 * grain if k.scale == "linear" else 0.00501 * abs(value)
         slack = 1e-9 * (k.high - k.low)
-        exact = a_value(k, position)
+        exact = track_value(k, position)
         assert abs(value - exact) <= shift + slack
         assert k.position(exact) == pytest.approx(position, abs=1e-9)
 
 
-def a_value(k: Knob, position: float) -> float:
+def track_value(k: Knob, position: float) -> float:
     """The scales as their docstring defines them, without rounding."""
     if k.scale == "linear":
         return k.low + position * (k.high - k.low)
@@ -115,8 +115,8 @@ def test_a_logarithmic_slider_from_zero_starts_linear_and_ends_logarithmic() -> 
 def test_a_dragged_value_is_one_that_the_slider_takes(
     name: str, dragged: float, value: float
 ) -> None:
-    assert Governed.nearest(name, dragged) == value
-    assert Governed().change({name: Governed.nearest(name, dragged)})
+    assert ConditionalParams.nearest(name, dragged) == value
+    assert ConditionalParams().change({name: ConditionalParams.nearest(name, dragged)})
 
 
 # What acts ------------------------------------------------------------------------------------
@@ -125,7 +125,7 @@ def test_a_dragged_value_is_one_that_the_slider_takes(
 LOAD = Group("Load", when={"limits": True})
 
 
-class Governed(Sample):
+class ConditionalParams(Sample):
     mass: float = LOAD.knob(0.2, 0.1, 2.0, "m", "kg", step=0.05)
     """Mass."""
     ki: float = LOAD.knob(0.0, 0.0, 1.0, "k_i", key=True, when={"law": "pid"})
@@ -149,12 +149,12 @@ class Governed(Sample):
 def test_a_tunable_acts_under_the_choices_it_names(
     changes: dict[str, object], acting: set[str]
 ) -> None:
-    params = Governed().change(changes)
+    params = ConditionalParams().change(changes)
     assert {name for name in params.tunables if params.acts(name)} == {*Sample.tunables} | acting
 
 
 def test_a_description_says_what_matters_and_when_it_acts() -> None:
-    described = {d["name"]: d for d in json.loads(json.dumps(Governed.describe()))}
+    described = {d["name"]: d for d in json.loads(json.dumps(ConditionalParams.describe()))}
     assert [name for name, d in described.items() if d["key"]] == ["ki"]
     assert described["kp"]["when"] == []
     assert described["ki"]["when"] == [{"limits": [True], "law": ["pid"]}]
@@ -164,7 +164,7 @@ def test_a_description_says_what_matters_and_when_it_acts() -> None:
 @pytest.mark.parametrize(
     "when", [{"law": "pdi"}, {"law": []}, {"kp": 1.0}, {"nothing": True}, {"limits": "pid"}]
 )
-def test_a_condition_names_options_of_a_choice(when: When) -> None:
+def test_a_condition_names_options_of_a_choice(when: Condition) -> None:
     with pytest.raises(TypeError, match=r"Astray: more acts when \w+ is one of"):
 
         class Astray(Sample):
@@ -310,7 +310,7 @@ def test_a_subclass_keeps_the_tunables_of_its_base() -> None:
 class Texts(Params):
     short: str = KNOBS.text("a", "S")
     """S."""
-    long: str = KNOBS.text("b", "L", max_length=LONGEST_TEXT)
+    long: str = KNOBS.text("b", "L", max_length=MAX_TEXT_LENGTH)
     """L."""
 
 
@@ -323,7 +323,7 @@ def test_a_text_has_a_length(name: str, most: int) -> None:
     assert described[name] == most
 
 
-@pytest.mark.parametrize("most", [0, LONGEST_TEXT + 1])
+@pytest.mark.parametrize("most", [0, MAX_TEXT_LENGTH + 1])
 def test_no_text_is_longer_than_a_request(most: int) -> None:
     with pytest.raises(ValueError, match="from 1 to 32000"):
         KNOBS.text("a", "T", max_length=most, help="T.")

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from labs.algorithms.butcher_tableau import parse_tableau
 from labs.appendix.integration.params import DORMAND_PRINCE
 from labs.errors import LabError
-from labs.optimal_control.lqr.own_system import EXAMPLE, own_system
+from labs.optimal_control.lqr.own_system import EXAMPLE_SYSTEM, parse_own_system
 from labs.tasks.grid_world.map import MAPS, GridWorld
 from labs.tasks.mdp_table.params import TAXICAB
 from labs.tasks.mdp_table.table import parse_table
@@ -30,9 +30,12 @@ READERS: dict[str, tuple[Callable[[str], object], list[str]]] = {
         ],
     ),
     "tableau": (parse_tableau, [DORMAND_PRINCE, "0 & \\\\ \\frac{1}{2} & 1/2 \\\\ & 0 & 1"]),
-    "matrices": (own_system, [EXAMPLE, '{"A": [[1]], "B": 1, "Q": 1, "R": 1, "x0": [1]}']),
+    "matrices": (
+        parse_own_system,
+        [EXAMPLE_SYSTEM, '{"A": [[1]], "B": 1, "Q": 1, "R": 1, "x0": [1]}'],
+    ),
 }
-SPOILT = [
+INVALID_TEXTS = [
     "",
     " ",
     "\n",
@@ -51,14 +54,25 @@ SPOILT = [
     "/0",
     "1e9999",
 ]
-SPOILT += ["nan", "null", "true", "9" * 70, "\ufeff", "\x00", "٣", "-", "#" * 400, "\n" * 900]
+INVALID_TEXTS += [
+    "nan",
+    "null",
+    "true",
+    "9" * 70,
+    "\ufeff",
+    "\x00",
+    "٣",
+    "-",
+    "#" * 400,
+    "\n" * 900,
+]
 
 
 @pytest.mark.parametrize("kind", READERS)
 @given(
     chosen=st.integers(0, 99),
     cuts=st.lists(
-        st.tuples(st.floats(0, 1), st.integers(0, 3), st.sampled_from(SPOILT)), max_size=5
+        st.tuples(st.floats(0, 1), st.integers(0, 3), st.sampled_from(INVALID_TEXTS)), max_size=5
     ),
 )
 @settings(deadline=None, max_examples=150)

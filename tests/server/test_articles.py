@@ -5,10 +5,10 @@ import re
 
 import pytest
 
-from labs.engine.catalog import CatalogEntry, catalog, find
-from server.articles import Article, render, render_text, words
-from server.formulas import ArticleError, tex
-from server.line_breaks import statements
+from labs.engine.catalog import CatalogEntry, catalog, find_lab
+from server.articles import Article, render, render_text, search_words
+from server.formulas import ArticleError, tex_to_mathml
+from server.line_breaks import split_statements
 
 COURSE = [entry for entry in catalog().values() if entry.package.startswith("labs.")]
 EXPERIMENT = """```experiment
@@ -64,7 +64,7 @@ def test_formulas_become_mathml(entry: CatalogEntry) -> None:
     ],
 )
 def test_a_formula_breaks_between_its_terms_alone(source: str, pieces: list[list[str]]) -> None:
-    assert statements(source) == pieces
+    assert split_statements(source) == pieces
 
 
 def test_a_text_may_begin_with_a_formula_and_end_with_a_number(entry: CatalogEntry) -> None:
@@ -100,7 +100,7 @@ def test_tables_can_scroll(entry: CatalogEntry) -> None:
 
 
 def test_a_drawing_beside_the_article_stands_in_the_page() -> None:
-    entry = find("td-control")
+    entry = find_lab("td-control")
     html = render_text(entry, '![two "lines"](policy_iteration.svg)').html
     assert 'role="img" aria-label="two &quot;lines&quot;"' in html
     assert "<svg" in html
@@ -290,14 +290,14 @@ def test_an_answer_may_begin_with_a_number(entry: CatalogEntry) -> None:
 
 
 def test_tex_renders_symbols() -> None:
-    assert tex("k_p") == "<math><msub><mi>k</mi><mi>p</mi></msub></math>"
-    assert 'display="block"' in tex("x", display=True)
+    assert tex_to_mathml("k_p") == "<math><msub><mi>k</mi><mi>p</mi></msub></math>"
+    assert 'display="block"' in tex_to_mathml("x", display=True)
     with pytest.raises(ArticleError, match="frac"):
-        tex("\\frac{1")
+        tex_to_mathml("\\frac{1")
 
 
 def test_words_are_distinct_and_without_formulas() -> None:
-    assert words("The arm, the ARM $\\alpha$ sags") == "arm sags the"
+    assert search_words("The arm, the ARM $\\alpha$ sags") == "arm sags the"
 
 
 def test_an_article_is_rendered_once(entry: CatalogEntry) -> None:

@@ -10,11 +10,11 @@ import trimesh
 import viser
 
 from server import boards
-from server.boards import SurfaceNode, glb
+from server.boards import SurfaceNode, surface_glb
 from server.mailbox import Mailbox
 from server.messages import View
 from server.viser_scene import ViserScene
-from tests.served import Served
+from tests.server_process import ServerProcess
 from tests.viser_client import SceneClient, message
 
 LOW = View(graphics="low")
@@ -44,9 +44,9 @@ def click(x: float, y: float) -> bytes:
 # Boards ---------------------------------------------------------------------------------------
 
 
-def test_a_click_on_a_board_is_an_edit(served: Served) -> None:
+def test_a_click_on_a_board_is_an_edit(shared_server: ServerProcess) -> None:
     with (
-        served.session("board") as session,
+        shared_server.session("board") as session,
         session.stream() as stream,
         SceneClient(session) as scene,
     ):
@@ -85,7 +85,7 @@ def test_a_drag_merges_and_its_last_point_is_kept() -> None:
 
 
 def test_only_the_colours_of_a_board_are_sent_again_and_only_while_they_change(
-    served: Served,
+    shared_server: ServerProcess,
 ) -> None:
     def updates(end: str) -> list[dict[str, Any]]:
         """What scene nodes are sent until the theme changes."""
@@ -98,11 +98,11 @@ def test_only_the_colours_of_a_board_are_sent_again_and_only_while_they_change(
                 found.append(m)
         raise AssertionError
 
-    with served.session("board") as session, SceneClient(session) as scene:
+    with shared_server.session("board") as session, SceneClient(session) as scene:
         scene.wait_for_node("/board")
         updates("dark")  # what belongs to the first picture
         updates("light")
-        waving = {m["name"].partition("#")[0]: m["updates"] for m in _later(scene, 120)}
+        waving = {m["name"].partition("#")[0]: m["updates"] for m in _advance_clock(scene, 120)}
         assert set(waving["/board"]) == {"batched_colors"}
         session.set(rate=0.0)
         updates("dark")  # what was under way
@@ -110,7 +110,7 @@ def test_only_the_colours_of_a_board_are_sent_again_and_only_while_they_change(
         assert updates("dark") == []
 
 
-def _later(scene: SceneClient, count: int) -> list[dict[str, Any]]:
+def _advance_clock(scene: SceneClient, count: int) -> list[dict[str, Any]]:
     found = (m for m, _ in zip(scene.messages(), range(count), strict=False))
     return [m for m in found if m["type"] == "SceneNodeUpdateMessage"]
 
@@ -118,7 +118,7 @@ def _later(scene: SceneClient, count: int) -> list[dict[str, Any]]:
 # Surfaces -------------------------------------------------------------------------------------
 
 
-def hills(rows: int, columns: int) -> tuple[np.ndarray, np.ndarray]:
+def wavy_surface(rows: int, columns: int) -> tuple[np.ndarray, np.ndarray]:
     x, y = np.meshgrid(np.linspace(-1, 1, columns), np.linspace(-1, 1, rows))
     points = np.stack([x, y, np.sin(3 * x) * y], axis=-1)
     return points, np.asarray(np.random.default_rng(0).uniform(0, 1, points.shape))
@@ -126,8 +126,8 @@ def hills(rows: int, columns: int) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize(("rows", "columns"), [(2, 2), (3, 7), (300, 300)])
 def test_a_surface_is_sound_gltf_that_others_read(rows: int, columns: int) -> None:
-    points, colors = hills(rows, columns)
-    scene: Any = trimesh.load_scene(io.BytesIO(glb(points, colors, 1.0)), file_type="glb")
+    points, colors = wavy_surface(rows, columns)
+    scene: Any = trimesh.load_scene(io.BytesIO(surface_glb(points, colors, 1.0)), file_type="glb")
     (mesh,) = scene.geometry.values()
     np.testing.assert_allclose(mesh.vertices, points.reshape(-1, 3), atol=1e-6)
     assert len(mesh.faces) == 2 * (rows - 1) * (columns - 1)
@@ -141,10 +141,12 @@ def test_a_surface_is_sound_gltf_that_others_read(rows: int, columns: int) -> No
 
 def test_a_colour_is_sent_linear_and_darker_where_the_light_is_brighter() -> None:
     """sRGB 0.5 is 0.2140 of full light."""
-    points, _ = hills(2, 2)
+    points, _ = wavy_surface(2, 2)
     grey = np.full((2, 2, 3), 0.5)
     for exposure in (1.0, 2.0):
-        sent = np.frombuffer(glb(points, grey, exposure)[-12 - 32 : -12], "<u2").reshape(4, 4)
+        sent = np.frombuffer(surface_glb(points, grey, exposure)[-12 - 32 : -12], "<u2").reshape(
+            4, 4
+        )
         np.testing.assert_allclose(sent[:, :3] / 65535, 0.2140 / exposure, atol=1e-4)
         assert (sent[:, 3] == 65535).all(), "opaque"
 
@@ -154,7 +156,7 @@ def test_a_surface_is_replaced_only_once_the_new_one_is_there(
 ) -> None:
     now = 100.0
     monkeypatch.setattr("server.boards.time.monotonic", lambda: now)
-    points, colors = hills(4, 5)
+    points, colors = wavy_surface(4, 5)
     node = SurfaceNode(server, "wave", points, colors, LOW)
     first, second = node._shown, node._hidden
     assert (first.visible, second.visible) == (True, False)
@@ -162,7 +164,7 @@ def test_a_surface_is_replaced_only_once_the_new_one_is_there(
     node.draw(points, colors)
     assert node._shown is first, "nothing changed"
     node.draw(points + 1.0, colors)
-    assert second.glb_data == glb(points + 1.0, colors, boards.exposure(LOW))
+    assert second.glb_data == surface_glb(points + 1.0, colors, boards.exposure(LOW))
     assert (first.visible, second.visible) == (True, False)
     now += 0.05
     node.draw(points + 2.0, colors)
@@ -172,13 +174,13 @@ def test_a_surface_is_replaced_only_once_the_new_one_is_there(
     assert (first.visible, second.visible) == (False, True)
     now += 0.1
     node.draw(points + 2.0, colors)
-    assert first.glb_data == glb(points + 2.0, colors, boards.exposure(LOW))
+    assert first.glb_data == surface_glb(points + 2.0, colors, boards.exposure(LOW))
     assert (first.visible, second.visible) == (False, True)
 
 
 def test_what_stands_upright_is_made_less_dark_than_what_lies() -> None:
     flat = np.stack([*np.meshgrid([0.0, 1.0], [0.0, 1.0]), np.zeros((2, 2))], axis=-1)
-    relief, _ = hills(4, 5)
+    relief, _ = wavy_surface(4, 5)
     for view in (LOW, View(graphics="high")):
         lying = boards.exposure(view)
         assert boards.exposure(view, flat) == boards.exposure(view, relief) == lying
@@ -204,10 +206,10 @@ def test_many_arrows_are_one_node_without_those_of_no_length(server: viser.Viser
     scene.arrows("policy", starts, ends)
     assert scene._nodes["policy"] is node
     assert node._handle.points.shape == (1, 2, 3)
-    assert scene._nodes.show_drawn() == [node]
+    assert scene._nodes.end_frame() == [node]
     for none in (starts, np.empty((0, 3))):
         scene.arrows("policy", none, none)
-    assert scene._nodes.show_drawn() == [], "where there is no arrow nothing is shown"
+    assert scene._nodes.end_frame() == [], "where there is no arrow nothing is shown"
 
 
 # Polygons and dots ----------------------------------------------------------------------------
@@ -250,7 +252,7 @@ def test_many_dots_and_many_lines_are_one_node_each(server: viser.ViserServer) -
     scene.dots("states", places[:7, 1], 0.02)
     assert scene._nodes["states"] is node
     assert node._handle.points.shape == (7, 3)
-    scene._nodes.show_drawn()
+    scene._nodes.end_frame()
     scene.dots("states", np.empty((0, 3)), 0.02)
     scene.trail("runs", np.empty((0, 4, 3)))
-    assert scene._nodes.show_drawn() == []
+    assert scene._nodes.end_frame() == []

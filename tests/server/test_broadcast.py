@@ -2,17 +2,17 @@
 
 from typing import Any, cast
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
-from server.broadcast import STATUS_EVERY, TELEMETRY, Broadcast, Controls
+from server.broadcast import STATUS_EVERY, TELEMETRY_PERIOD, Broadcast, SessionControls
 from server.messages import Telemetry, View
 from server.pacing import Pacer
-from server.pipe import STATUS, STREAM, Link
+from server.pipe import STATUS, STREAM, WorkerPipe
 from server.solver_clock import SolverClock
 from server.viser_scene import ViserScene
 
 
-class Sent:
+class RecordingPipe:
     """A link that keeps what goes through it."""
 
     def __init__(self) -> None:
@@ -27,15 +27,15 @@ class Sent:
         return found
 
 
-def broadcast_of(world: World) -> tuple[Broadcast, Sent]:
-    sent, solver = Sent(), SolverClock(world, None)
-    controls = Controls(world, running=True, view=View(), viewers=1)
-    link, scene = cast(Link, sent), cast(ViserScene, None)
+def broadcast_of(world: World) -> tuple[Broadcast, RecordingPipe]:
+    sent, solver = RecordingPipe(), SolverClock(world, None)
+    controls = SessionControls(world, running=True, view=View(), viewers=1)
+    link, scene = cast(WorkerPipe, sent), cast(ViserScene, None)
     return Broadcast(link, scene, controls, Pacer(world, 1.0), solver), sent
 
 
 def test_a_change_is_shown_by_the_first_step_that_knows_it() -> None:
-    world = World(find("joint-control"), {"reference": "set-point", "amplitude": 0.2})
+    world = World(find_lab("joint-control"), {"reference": "set-point", "amplitude": 0.2})
     column = world.recorder.columns.index("q_ref[0]")
     broadcast, sent = broadcast_of(world)
     now = 100.0
@@ -45,10 +45,10 @@ def test_a_change_is_shown_by_the_first_step_that_knows_it() -> None:
     world.advance()  # a row that is not due yet, and knows nothing of the change
     world.change({"amplitude": 0.5})
     broadcast.request_update()
-    broadcast.send_samples(now + 0.1 * TELEMETRY)
+    broadcast.send_samples(now + 0.1 * TELEMETRY_PERIOD)
     assert not sent.take(STREAM)
     world.advance()
-    broadcast.send_samples(now + 0.2 * TELEMETRY)
+    broadcast.send_samples(now + 0.2 * TELEMETRY_PERIOD)
     (telemetry,) = sent.take(STREAM)
     assert isinstance(telemetry, Telemetry)
     assert len(telemetry.rows) == 2
@@ -56,7 +56,7 @@ def test_a_change_is_shown_by_the_first_step_that_knows_it() -> None:
 
 
 def test_a_status_that_was_sent_is_not_due_again() -> None:
-    world = World(find("joint-control"))
+    world = World(find_lab("joint-control"))
     broadcast, sent = broadcast_of(world)
     now = 100.0
     broadcast.request_update()

@@ -6,15 +6,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from server.camera import CHARACTER, MEMORY, Camera, Drawn
-from server.framing import FOV, Window, camera_axes, extremes, nearest
+from server.camera import HALF_CHARACTER_WIDTH, MEMORY_SECONDS, Camera, FrameContents
+from server.framing import FOV, Window, camera_axes, nearest_camera, side_extremes
 
 SIZES = ((640, 270), (660, 360), (390, 350), (1366, 650))
 HOME = np.array([[1.0, -1.0, 0.8], [0.0, 0.0, 0.3]])
 AXES = camera_axes(*HOME)
 
 
-def cloud(seed: int, size: float = 1.0) -> np.ndarray:
+def random_points(seed: int, size: float = 1.0) -> np.ndarray:
     """(40, 3) [m]"""
     return np.random.default_rng(seed).uniform(-size, size, (40, 3))
 
@@ -45,7 +45,7 @@ class Viewer:
 
 
 def follow(camera: Camera, points: np.ndarray, *, now: float = 0.0, changed: bool = False) -> None:
-    camera.follow(Drawn(points, []), HOME, now, changed=changed)
+    camera.follow(FrameContents(points, []), HOME, now, changed=changed)
 
 
 def test_axes_are_those_of_a_camera_that_stands_upright() -> None:
@@ -61,8 +61,8 @@ def test_axes_are_those_of_a_camera_that_stands_upright() -> None:
 def test_the_nearest_camera_that_has_all_in_its_window(size: tuple[int, int]) -> None:
     window = Window.of(*size)
     for seed in range(20):
-        points = cloud(seed, 0.1 + seed)
-        camera = nearest(extremes(points, window), window)
+        points = random_points(seed, 0.1 + seed)
+        camera = nearest_camera(side_extremes(points, window), window)
         free = window.tangents - slopes(points, camera)
         assert free.min() > -1e-9
         assert free.reshape(2, 2).max(axis=1).min() < 1e-9, "one pair of sides is touched"
@@ -72,7 +72,7 @@ def test_the_nearest_camera_that_has_all_in_its_window(size: tuple[int, int]) ->
 
 @pytest.mark.parametrize("size", SIZES)
 def test_a_viewer_sees_all_at_once_and_what_comes_after_a_while(size: tuple[int, int]) -> None:
-    viewer, points = Viewer(*size), cloud(0)
+    viewer, points = Viewer(*size), random_points(0)
     camera = Camera(viewer)  # type: ignore[arg-type]
     follow(camera, points)
     assert viewer.shows(points)
@@ -89,7 +89,7 @@ def test_a_viewer_sees_all_at_once_and_what_comes_after_a_while(size: tuple[int,
 
 
 def test_what_runs_away_does_not_shrink_the_rest() -> None:
-    viewer, points = Viewer(640, 270), cloud(0)
+    viewer, points = Viewer(640, 270), random_points(0)
     camera = Camera(viewer)  # type: ignore[arg-type]
     follow(camera, points)
     away = np.linalg.norm(viewer.camera.position)
@@ -99,7 +99,7 @@ def test_what_runs_away_does_not_shrink_the_rest() -> None:
 
 
 def test_a_hand_is_left_alone_until_the_view_is_reset() -> None:
-    viewer, points = Viewer(640, 270), cloud(0)
+    viewer, points = Viewer(640, 270), random_points(0)
     camera = Camera(viewer)  # type: ignore[arg-type]
     follow(camera, points)
     fitted = viewer.camera.position
@@ -109,7 +109,7 @@ def test_a_hand_is_left_alone_until_the_view_is_reset() -> None:
     viewer.camera.image_width = 900
     follow(camera, points)
     np.testing.assert_array_equal(viewer.camera.position, turned)
-    camera.release()
+    camera.reset()
     viewer.camera.image_width = 640
     follow(camera, points)
     np.testing.assert_allclose(viewer.camera.position, fitted)
@@ -117,7 +117,7 @@ def test_a_hand_is_left_alone_until_the_view_is_reset() -> None:
 
 def test_a_camera_that_was_set_back_by_its_viewer_follows_again() -> None:
     """By its own "Reset View"; and a viewer that opens may go there late."""
-    viewer, points = Viewer(640, 270), cloud(0)
+    viewer, points = Viewer(640, 270), random_points(0)
     camera = Camera(viewer)  # type: ignore[arg-type]
     for _ in range(2):
         follow(camera, points)
@@ -131,7 +131,7 @@ def test_a_camera_that_was_set_back_by_its_viewer_follows_again() -> None:
 
 
 def test_a_change_moves_the_camera_nearer_only_if_it_is_worth_it() -> None:
-    viewer, points = Viewer(640, 270), cloud(0)
+    viewer, points = Viewer(640, 270), random_points(0)
     camera = Camera(viewer)  # type: ignore[arg-type]
     follow(camera, points)
     fitted = viewer.camera.position
@@ -147,18 +147,18 @@ def test_a_change_moves_the_camera_nearer_only_if_it_is_worth_it() -> None:
 
 
 def test_what_went_far_once_is_forgotten() -> None:
-    viewer, points = Viewer(640, 270), cloud(0)
+    viewer, points = Viewer(640, 270), random_points(0)
     camera = Camera(viewer)  # type: ignore[arg-type]
     follow(camera, points)
     fitted = viewer.camera.position
     for frame in range(300):
-        now = 3.0 * MEMORY * frame / 200
+        now = 3.0 * MEMORY_SECONDS * frame / 200
         follow(camera, 1.8 * points if frame == 10 else points, now=now)
     np.testing.assert_allclose(viewer.camera.position, fitted, atol=0.02)
 
 
 def test_another_window_is_fitted_at_once() -> None:
-    viewer, points = Viewer(640, 270), cloud(0)
+    viewer, points = Viewer(640, 270), random_points(0)
     camera = Camera(viewer)  # type: ignore[arg-type]
     follow(camera, points)
     viewer.camera.image_width, viewer.camera.image_height = 300, 600
@@ -168,7 +168,7 @@ def test_another_window_is_fitted_at_once() -> None:
 
 
 def test_a_viewer_that_draws_coarser_for_a_while_is_left_where_it_is() -> None:
-    viewer, points = Viewer(640, 270), cloud(0)
+    viewer, points = Viewer(640, 270), random_points(0)
     camera = Camera(viewer)  # type: ignore[arg-type]
     follow(camera, points)
     fitted = viewer.camera.position
@@ -178,20 +178,22 @@ def test_a_viewer_that_draws_coarser_for_a_while_is_left_where_it_is() -> None:
 
 
 def test_labels_are_in_view_too() -> None:
-    viewer, points = Viewer(390, 350), 0.3 * cloud(0)
+    viewer, points = Viewer(390, 350), 0.3 * random_points(0)
     corner = points[np.argmax(points @ AXES[0])]
     camera = Camera(viewer)  # type: ignore[arg-type]
     follow(camera, points)
-    half_text = 30 * CHARACTER
+    half_text = 30 * HALF_CHARACTER_WIDTH
     assert viewer.pixels(corner[None])[0, 0] + half_text > 390 / 2
-    camera.release()
-    camera.follow(Drawn(points, [(corner, 30)]), HOME, 0.0, changed=False)
+    camera.reset()
+    camera.follow(FrameContents(points, [(corner, 30)]), HOME, 0.0, changed=False)
     assert viewer.pixels(corner[None])[0, 0] + half_text < 390 / 2
 
 
 def test_a_narrow_window_shows_the_core_as_large_as_it_goes() -> None:
-    core = cloud(1, 0.3)
-    drawn = Drawn(np.concatenate([core, cloud(2) + np.array([3.0, 0.0, 0.0])]), [], core)
+    core = random_points(1, 0.3)
+    drawn = FrameContents(
+        np.concatenate([core, random_points(2) + np.array([3.0, 0.0, 0.0])]), [], core
+    )
     for size, all_of_it in (((660, 360), True), ((390, 350), False)):
         viewer = Viewer(*size)
         Camera(viewer).follow(drawn, HOME, 0.0, changed=False)  # type: ignore[arg-type]

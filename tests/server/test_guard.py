@@ -11,72 +11,72 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from server.app import create_app
-from server.serving import addresses
+from server.serving import host_addresses
 from server.settings import Settings
-from tests.served import Served
+from tests.server_process import ServerProcess
 
 
-def test_other_origins_may_not_change_anything(served: Served) -> None:
-    answer = served.http.post(
+def test_other_origins_may_not_change_anything(shared_server: ServerProcess) -> None:
+    answer = shared_server.http.post(
         "/api/sessions", json={"lab": "oscillator"}, headers={"origin": "http://evil.example"}
     )
     assert answer.status_code == 403
     assert answer.json()["code"] == "wrong-origin"
 
 
-def test_the_own_origin_may(served: Served) -> None:
-    answer = served.http.post(
-        "/api/sessions", json={"lab": "oscillator"}, headers={"origin": served.address}
+def test_the_own_origin_may(shared_server: ServerProcess) -> None:
+    answer = shared_server.http.post(
+        "/api/sessions", json={"lab": "oscillator"}, headers={"origin": shared_server.address}
     )
     assert answer.status_code == 201
-    served.http.delete(f"/api/sessions/{answer.json()['id']}")
+    shared_server.http.delete(f"/api/sessions/{answer.json()['id']}")
 
 
-def test_a_rebound_name_is_refused(served: Served) -> None:
-    answer = served.http.get("/", headers={"host": "evil.example"})
+def test_a_rebound_name_is_refused(shared_server: ServerProcess) -> None:
+    answer = shared_server.http.get("/", headers={"host": "evil.example"})
     assert answer.status_code == 403
     assert answer.json()["code"] == "wrong-host"
 
 
 @pytest.mark.parametrize("path", ["stream", "scene"])
-def test_other_origins_may_open_no_websocket(served: Served, path: str) -> None:
-    with served.session("oscillator") as session:
+def test_other_origins_may_open_no_websocket(shared_server: ServerProcess, path: str) -> None:
+    with shared_server.session("oscillator") as session:
         end = session.info["stream"] if path == "stream" else session.info["scene"].rstrip("/")
-        address = served.address.replace("http", "ws") + end
+        address = shared_server.address.replace("http", "ws") + end
         with pytest.raises(InvalidStatus) as refused:
             connect(address, origin="http://evil.example", subprotocols=["viser-v1.1.1"])  # type: ignore[arg-type,list-item]
         assert refused.value.response.status_code == 403
 
 
-def test_a_worker_answers_no_web_page(served: Served) -> None:
+def test_a_worker_answers_no_web_page(shared_server: ServerProcess) -> None:
     """Past the proxy, on the worker's own port, any Origin is refused."""
-    with served.session("oscillator"):
-        ports = {port for _, port in served.listeners().values()}
+    with shared_server.session("oscillator"):
+        ports = {port for _, port in shared_server.listeners().values()}
         assert ports
         for port in ports:
             with pytest.raises(InvalidStatus) as refused:
                 connect(
                     f"ws://127.0.0.1:{port}",
-                    origin=served.address,  # type: ignore[arg-type]
+                    origin=shared_server.address,  # type: ignore[arg-type]
                     subprotocols=["viser-v1.1.1"],  # type: ignore[list-item]
                 )
             assert refused.value.response.status_code == 403
 
 
-def test_workers_listen_on_loopback_only(served: Served) -> None:
-    with served.session("oscillator"):
-        assert {address for address, _ in served.listeners().values()} == {"127.0.0.1"}
+def test_workers_listen_on_loopback_only(shared_server: ServerProcess) -> None:
+    with shared_server.session("oscillator"):
+        assert {address for address, _ in shared_server.listeners().values()} == {"127.0.0.1"}
 
 
-def test_a_huge_body_is_not_read(served: Served) -> None:
-    answer = served.http.post("/api/sessions", content=b"x" * 100_000)
+def test_a_huge_body_is_not_read(shared_server: ServerProcess) -> None:
+    answer = shared_server.http.post("/api/sessions", content=b"x" * 100_000)
     assert answer.status_code == 413
     assert "65536" in answer.json()["error"]
 
 
-def test_a_huge_body_of_unknown_length_is_not_read(served: Served) -> None:
+def test_a_huge_body_of_unknown_length_is_not_read(shared_server: ServerProcess) -> None:
     parts = (b"x" * 1000 for _ in range(100))
-    answer = served.http.post("/api/sessions", content=parts)
+    answer = shared_server.http.post("/api/sessions", content=parts)
     assert answer.status_code == 413
 
 
@@ -85,13 +85,13 @@ def test_a_huge_body_of_unknown_length_is_not_read(served: Served) -> None:
 PREFIX = "/user/student/proxy/8301"
 
 
-def inside(**settings: Any) -> TestClient:
+def client_without_workers(**settings: Any) -> TestClient:
     """A client of an application without workers."""
     return TestClient(create_app(Settings(**settings)), base_url="http://127.0.0.1")
 
 
 def test_a_prefix_may_be_taken_away_by_the_proxy_or_not() -> None:
-    client = inside(root_path=f"{PREFIX}/")
+    client = client_without_workers(root_path=f"{PREFIX}/")
     for prefix in ("", PREFIX):
         page = client.get(f"{prefix}/labs/oscillator")
         assert page.status_code == 200
@@ -104,10 +104,10 @@ def test_a_prefix_may_be_taken_away_by_the_proxy_or_not() -> None:
 
 def test_the_name_a_proxy_gives_has_to_be_named() -> None:
     hub = {"host": "hub.example"}
-    refused = inside().get("/healthz", headers=hub)
+    refused = client_without_workers().get("/healthz", headers=hub)
     assert refused.status_code == 403
     assert "ORCLAB_ORIGINS" in refused.json()["error"]
-    client = inside(origins=("https://hub.example",))
+    client = client_without_workers(origins=("https://hub.example",))
     page = client.get("/labs/oscillator", headers=hub)
     assert page.status_code == 200
     assert "wss://hub.example" in page.headers["content-security-policy"]
@@ -136,10 +136,10 @@ def test_what_is_no_address_is_refused(wrong: dict[str, Any]) -> None:
 
 
 def test_who_listens_to_all_prints_what_others_open(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert addresses("127.0.0.1") == ["127.0.0.1"]
-    assert addresses("::1") == ["[::1]"]
+    assert host_addresses("127.0.0.1") == ["127.0.0.1"]
+    assert host_addresses("::1") == ["[::1]"]
     monkeypatch.setattr(socket, "gethostname", lambda: "desk")
-    own, *others = addresses("0.0.0.0")
+    own, *others = host_addresses("0.0.0.0")
     assert own == "127.0.0.1"
     assert others[-1] == "desk"
     for other in others[:-1]:

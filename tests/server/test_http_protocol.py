@@ -12,13 +12,13 @@ from starlette.websockets import WebSocket
 from websockets.asyncio.client import connect
 
 from server.http_protocol import HttpProtocol
-from tests.served import run_apart
+from tests.server_process import run_in_thread
 
 SECONDS = 0.3
 HEAD = b"POST / HTTP/1.1\r\nHost: here\r\n"
 
 
-class Hasty(HttpProtocol):
+class ShortTimeoutProtocol(HttpProtocol):
     request_seconds = SECONDS
 
 
@@ -38,7 +38,12 @@ async def slow(scope: Scope, receive: Receive, send: Send) -> None:
 @contextlib.asynccontextmanager
 async def serving() -> AsyncIterator[int]:
     config = uvicorn.Config(
-        slow, http=Hasty, port=0, lifespan="off", log_level="critical", timeout_keep_alive=1
+        slow,
+        http=ShortTimeoutProtocol,
+        port=0,
+        lifespan="off",
+        log_level="critical",
+        timeout_keep_alive=1,
     )
     server = uvicorn.Server(config)
     task = asyncio.create_task(server.serve())
@@ -51,7 +56,7 @@ async def serving() -> AsyncIterator[int]:
         await task
 
 
-async def answer(port: int, *parts: bytes) -> bytes:
+async def read_to_end(port: int, *parts: bytes) -> bytes:
     """All that comes until the server closes, though nobody here does."""
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
     for part in parts:
@@ -66,7 +71,7 @@ async def answer(port: int, *parts: bytes) -> bytes:
         writer.close()
 
 
-def test_what_does_not_end_is_ended_and_what_thinks_is_not() -> None:
+def test_unfinished_requests_time_out_and_slow_answers_do_not() -> None:
     """Nothing said; half a head; half a body; and after a whole request half of another, later or
     with it."""
     whole = HEAD + b"Content-Length: 2\r\n\r\nhi"
@@ -77,9 +82,9 @@ def test_what_does_not_end_is_ended_and_what_thinks_is_not() -> None:
             unfinished = [(), (HEAD,), (HEAD, b"Content-Length: 9\r\n\r\n", b"hi")]
             answered = [(whole,), (HEAD, whole.removeprefix(HEAD)), (whole, HEAD), (whole + part,)]
             sayings = [*unfinished, *answered]
-            return await asyncio.gather(*(answer(port, *parts) for parts in sayings))
+            return await asyncio.gather(*(read_to_end(port, *parts) for parts in sayings))
 
-    *ended, once, in_parts, twice, at_once = run_apart(speak())
+    *ended, once, in_parts, twice, at_once = run_in_thread(speak())
     assert not any(said.startswith(b"HTTP/1.1 200") for said in ended)
     for said in (once, in_parts, twice, at_once):
         assert said.startswith(b"HTTP/1.1 200")
@@ -92,4 +97,4 @@ def test_a_websocket_lives_on() -> None:
         async with serving() as port, connect(f"ws://127.0.0.1:{port}/") as socket:
             return await socket.recv()
 
-    assert run_apart(hear()) == "still here"
+    assert run_in_thread(hear()) == "still here"

@@ -11,16 +11,16 @@ import numpy as np
 import psutil
 import pytest
 
-from tests.served import Opened, Served, until
+from tests.server_process import ServerProcess, SessionClient, wait_until
 from tests.viser_client import SceneClient
 
 
-def test_a_killed_worker_is_replaced_with_the_same_parameters(served: Served) -> None:
-    until(lambda: served.health()["workers"] == served.health()["spares"] == 1)
-    before = set(served.listeners())
+def test_a_killed_worker_is_replaced_with_the_same_parameters(shared_server: ServerProcess) -> None:
+    wait_until(lambda: shared_server.health()["workers"] == shared_server.health()["spares"] == 1)
+    before = set(shared_server.listeners())
     params = {"omega": 6.5, "noisy": True}
     with (
-        served.session("oscillator", params=params, seed=7) as session,
+        shared_server.session("oscillator", params=params, seed=7) as session,
         session.stream() as stream,
     ):
         stream.next("status", lambda s: s["t"] > 0.3)
@@ -35,23 +35,27 @@ def test_a_killed_worker_is_replaced_with_the_same_parameters(served: Served) ->
         assert status["params"].items() >= params.items()
         assert status["seed"] == 7
         assert status["running"]
-        assert worker not in served.listeners()
+        assert worker not in shared_server.listeners()
 
 
-def test_a_killed_fork_server_takes_nothing_down(mortal: Served) -> None:
-    with mortal.session("oscillator") as session, session.stream() as stream:
+def test_a_killed_fork_server_takes_nothing_down(single_place_server: ServerProcess) -> None:
+    with single_place_server.session("oscillator") as session, session.stream() as stream:
         stream.next("status", lambda s: s["t"] > 0.3)
-        (fork_server,) = {psutil.Process(worker).ppid() for worker in mortal.listeners()}
+        (fork_server,) = {
+            psutil.Process(worker).ppid() for worker in single_place_server.listeners()
+        }
         os.kill(fork_server, signal.SIGKILL)
         assert stream.next("notice")["state"] == "recovering"
         assert stream.next("notice")["state"] == "live"
         assert stream.next("status", lambda s: s["t"] > 0.1)
 
 
-def test_a_request_broken_off_leaves_the_fork_server_and_its_workers(mortal: Served) -> None:
-    with mortal.session("oscillator") as session, session.stream() as stream:
-        until(lambda: mortal.health()["spares"] == 1)
-        workers = set(mortal.listeners())
+def test_a_request_broken_off_leaves_the_fork_server_and_its_workers(
+    single_place_server: ServerProcess,
+) -> None:
+    with single_place_server.session("oscillator") as session, session.stream() as stream:
+        wait_until(lambda: single_place_server.health()["spares"] == 1)
+        workers = set(single_place_server.listeners())
         (fork_server,) = {psutil.Process(worker).ppid() for worker in workers}
         sockets = psutil.Process(fork_server).net_connections("unix")
         (address,) = {found.laddr for found in sockets if "listener-" in str(found.laddr)}
@@ -60,15 +64,17 @@ def test_a_request_broken_off_leaves_the_fork_server_and_its_workers(mortal: Ser
                 client.connect(address)
         before = stream.next("status")["t"]
         assert stream.next("status", lambda s: s["t"] > before + 0.3)
-        assert set(mortal.listeners()) == workers
-    until(lambda: mortal.health()["sessions"] == 0)
-    with mortal.session("oscillator"):
-        until(lambda: mortal.health()["spares"] == 1)
-        assert {psutil.Process(worker).ppid() for worker in mortal.listeners()} == {fork_server}
+        assert set(single_place_server.listeners()) == workers
+    wait_until(lambda: single_place_server.health()["sessions"] == 0)
+    with single_place_server.session("oscillator"):
+        wait_until(lambda: single_place_server.health()["spares"] == 1)
+        assert {psutil.Process(worker).ppid() for worker in single_place_server.listeners()} == {
+            fork_server
+        }
 
 
-def test_a_hung_lab_is_replaced_and_then_given_up(served: Served) -> None:
-    with served.session("troublesome") as session, session.stream() as stream:
+def test_a_hung_lab_is_replaced_and_then_given_up(shared_server: ServerProcess) -> None:
+    with shared_server.session("troublesome") as session, session.stream() as stream:
         stream.next("status", lambda s: s["t"] > 0.1)
         session.set(fault="hang")
         notice = stream.next("notice")
@@ -80,8 +86,8 @@ def test_a_hung_lab_is_replaced_and_then_given_up(served: Served) -> None:
         assert session.set(fault="none").status_code == 503
 
 
-def test_trouble_stops_the_world_and_reset_starts_it(served: Served) -> None:
-    with served.session("troublesome") as session, session.stream() as stream:
+def test_trouble_stops_the_world_and_reset_starts_it(shared_server: ServerProcess) -> None:
+    with shared_server.session("troublesome") as session, session.stream() as stream:
         session.set(fault="trouble")
         stuck = stream.next("status", lambda s: s["trouble"])
         assert stuck["trouble"].startswith("It diverged")
@@ -90,8 +96,8 @@ def test_trouble_stops_the_world_and_reset_starts_it(served: Served) -> None:
         assert stream.next("status", lambda s: not s["trouble"] and s["t"] > 0.1)
 
 
-def test_a_lab_that_raises_says_so_and_lives_on(served: Served) -> None:
-    with served.session("troublesome") as session, session.stream() as stream:
+def test_a_lab_that_raises_says_so_and_lives_on(shared_server: ServerProcess) -> None:
+    with shared_server.session("troublesome") as session, session.stream() as stream:
         session.set(fault="raise")
         stuck = stream.next("status", lambda s: s["trouble"])
         assert "ZeroDivisionError" in stuck["trouble"]
@@ -101,21 +107,21 @@ def test_a_lab_that_raises_says_so_and_lives_on(served: Served) -> None:
         assert stream.next("status", lambda s: not s["trouble"] and s["t"] > 0.1)
 
 
-def test_a_slow_lab_slows_time_down_and_says_so(served: Served) -> None:
+def test_a_slow_lab_slows_time_down_and_says_so(shared_server: ServerProcess) -> None:
     slow = {"fault": "slow"}
-    with served.session("troublesome", params=slow) as session, session.stream() as stream:
+    with shared_server.session("troublesome", params=slow) as session, session.stream() as stream:
         status = stream.next("status", lambda s: s["capped"])
         assert status["real_time_factor"] < 0.5
 
 
-def test_a_slow_reader_slows_nobody_and_grows_nothing(served: Served) -> None:
+def test_a_slow_reader_slows_nobody_and_grows_nothing(shared_server: ServerProcess) -> None:
     with (
-        served.session("joint-control") as session,
+        shared_server.session("joint-control") as session,
         session.stream(max_queue=1) as lazy,
         session.stream() as brisk,
     ):
         lazy.next("status")
-        web = psutil.Process(served.process.pid)
+        web = psutil.Process(shared_server.process.pid)
         brisk.next("status", lambda s: s["t"] > 1)
         memory = web.memory_info().rss
         times = [row[0] for row in brisk.next("telemetry")["rows"]]
@@ -127,38 +133,42 @@ def test_a_slow_reader_slows_nobody_and_grows_nothing(served: Served) -> None:
         lazy.next("telemetry", lambda m: m["rows"] and m["rows"][-1][0] > times[-1] - 1)
 
 
-def test_the_session_limit_is_told_in_words(mortal: Served) -> None:
-    with mortal.session("oscillator"):
-        answer = mortal.http.post("/api/sessions", json={"lab": "oscillator"})
+def test_the_session_limit_is_told_in_words(single_place_server: ServerProcess) -> None:
+    with single_place_server.session("oscillator"):
+        answer = single_place_server.http.post("/api/sessions", json={"lab": "oscillator"})
         assert answer.status_code == 503
         assert answer.json()["code"] == "full"
         assert "all 1 places are taken" in answer.json()["error"]
 
 
-def test_idle_sessions_end(impatient: Served) -> None:
-    opened = impatient.http.post("/api/sessions", json={"lab": "oscillator"}).json()
-    until(lambda: impatient.http.get(f"/api/sessions/{opened['id']}").status_code == 404)
-    with impatient.session("oscillator") as session, session.stream() as stream:
+def test_idle_sessions_end(short_timeout_server: ServerProcess) -> None:
+    opened = short_timeout_server.http.post("/api/sessions", json={"lab": "oscillator"}).json()
+    wait_until(
+        lambda: short_timeout_server.http.get(f"/api/sessions/{opened['id']}").status_code == 404
+    )
+    with short_timeout_server.session("oscillator") as session, session.stream() as stream:
         notice = stream.next("notice")
         assert notice["state"] == "ended"
         assert "same parameters" in notice["text"]
-    until(lambda: impatient.health()["sessions"] == 0)
+    wait_until(lambda: short_timeout_server.health()["sessions"] == 0)
 
 
-def test_ended_sessions_leave_no_process(served: Served) -> None:
-    with served.session("oscillator"):
+def test_ended_sessions_leave_no_process(shared_server: ServerProcess) -> None:
+    with shared_server.session("oscillator"):
         pass
-    until(lambda: served.health()["sessions"] == 0)
+    wait_until(lambda: shared_server.health()["sessions"] == 0)
     # The fork server, the resource tracker and the spare remain.
-    until(lambda: served.health()["workers"] == served.health()["spares"] == 1)
+    wait_until(lambda: shared_server.health()["workers"] == shared_server.health()["spares"] == 1)
 
 
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
-def test_no_process_survives_the_server(mortal: Served, how: signal.Signals) -> None:
-    server = mortal
+def test_no_process_survives_the_server(
+    single_place_server: ServerProcess, how: signal.Signals
+) -> None:
+    server = single_place_server
     answer = server.http.post("/api/sessions", json={"lab": "troublesome"}).json()
     path = f"/api/sessions/{answer['id']}/params"
-    until(lambda: server.health()["workers"] == 2)
+    wait_until(lambda: server.health()["workers"] == 2)
     below = server.workers()
     assert len(below) >= 3
     # One of the workers is stuck in an endless loop when the server goes.
@@ -175,7 +185,7 @@ def test_the_first_start_may_take_its_time(tmp_path: Path) -> None:
     """Longer than a hung worker is given, and than a session nobody watches."""
     prepared = tmp_path / "prepared"
     with (
-        Served(
+        ServerProcess(
             wait=False,
             PREPARED_BY=str(prepared),
             ORCLAB_HANG_SECONDS="1",
@@ -184,12 +194,12 @@ def test_the_first_start_may_take_its_time(tmp_path: Path) -> None:
         ThreadPoolExecutor() as pool,
     ):
         assert server.health()["preparing"]
-        opening = pool.submit(Opened.new, server, "oscillator", {})
-        until(lambda: server.health()["sessions"] == 1)
+        opening = pool.submit(SessionClient.new, server, "oscillator", {})
+        wait_until(lambda: server.health()["sessions"] == 1)
         asked = time.monotonic()
         assert server.process.stdout is not None
         assert server.process.stdout.readline().startswith("First start: compiling the solvers")
-        until(lambda: time.monotonic() > asked + 4)
+        wait_until(lambda: time.monotonic() > asked + 4)
         assert server.health()["preparing"]
         prepared.touch()
         with opening.result().stream() as stream:
@@ -199,7 +209,7 @@ def test_the_first_start_may_take_its_time(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_a_server_that_still_prepares_ends_at_once(how: signal.Signals, tmp_path: Path) -> None:
-    server = Served(wait=False, PREPARED_BY=str(tmp_path / "never"))
+    server = ServerProcess(wait=False, PREPARED_BY=str(tmp_path / "never"))
     assert server.process.stdout is not None
     assert server.process.stdout.readline().startswith("First start")
     below = server.workers()
@@ -208,25 +218,29 @@ def test_a_server_that_still_prepares_ends_at_once(how: signal.Signals, tmp_path
     assert not psutil.wait_procs(below, timeout=10)[1], "these survived"
 
 
-def test_a_restarted_server_answers_404_for_the_old_session(mortal: Served) -> None:
-    old = mortal.http.post("/api/sessions", json={"lab": "oscillator"}).json()
-    below = mortal.workers()
-    mortal.stop(signal.SIGINT)
+def test_a_restarted_server_answers_404_for_the_old_session(
+    single_place_server: ServerProcess,
+) -> None:
+    old = single_place_server.http.post("/api/sessions", json={"lab": "oscillator"}).json()
+    below = single_place_server.workers()
+    single_place_server.stop(signal.SIGINT)
     assert not psutil.wait_procs(below, timeout=10)[1], "these survived"
-    mortal.start(wait=False)
-    assert mortal.http.get(f"/api/sessions/{old['id']}").status_code == 404
+    single_place_server.start(wait=False)
+    assert single_place_server.http.get(f"/api/sessions/{old['id']}").status_code == 404
 
 
-def test_a_server_ends_quietly_though_its_viewers_worker_is_stuck(mortal: Served) -> None:
+def test_a_server_ends_quietly_though_its_viewers_worker_is_stuck(
+    single_place_server: ServerProcess,
+) -> None:
     """The scenes' relays wait for a worker that does not even close its connections."""
-    assert mortal.stderr is not None
-    said = Path(mortal.stderr.name)
+    assert single_place_server.stderr is not None
+    said = Path(single_place_server.stderr.name)
     before = said.stat().st_size
-    (worker,) = mortal.listeners()  # the spare, which the session takes
-    session = Opened.new(mortal, "oscillator", {})
+    (worker,) = single_place_server.listeners()  # the spare, which the session takes
+    session = SessionClient.new(single_place_server, "oscillator", {})
     viewers = [SceneClient(session) for _ in range(5)]
     os.kill(worker, signal.SIGSTOP)
-    mortal.stop()
+    single_place_server.stop()
     for viewer in viewers:
         viewer.socket.close()
     text = said.read_bytes()[before:].decode()

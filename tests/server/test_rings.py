@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from labs.models.arms import load
+from labs.models.arms import load_arm
 from server.messages import View
 from server.nodes import ArmNode
 
@@ -17,9 +17,9 @@ from server.nodes import ArmNode
 )
 def test_a_ring_stands_across_its_joints_axis(robot: str, axes: str) -> None:
     server = MagicMock()
-    arm = load(robot)
+    arm = load_arm(robot)
     node = ArmNode(server, "robot", arm, False, View(graphics="low"))
-    node.rings(np.ones(arm.model.nv))
+    node.mark_torque_limits(np.ones(arm.model.nv))
     calls = server.scene.add_mesh_simple.call_args_list
     rings = [call for call in calls if call.args[0].endswith("/ring")]
     assert len(rings) == len(axes)

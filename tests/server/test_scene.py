@@ -10,21 +10,25 @@ import viser
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from labs.engine.catalog import find
-from labs.models.arms import load
+from labs.engine.catalog import find_lab
+from labs.models.arms import load_arm
 from server.mailbox import Mailbox
 from server.messages import View
 from server.nodes import COLORS, DARK, LIGHT, blend_with_background
 from server.viser_scene import ViserScene
-from tests.served import Served, until
-from tests.viser_client import PROTOCOL, SceneClient, camera, message
+from tests.server_process import ServerProcess, wait_until
+from tests.viser_client import PROTOCOL, SceneClient, camera_message, message
 
 
-def test_the_viewers_script_comes_after_the_element_it_draws_in(served: Served) -> None:
+def test_the_viewers_script_comes_after_the_element_it_draws_in(
+    shared_server: ServerProcess,
+) -> None:
     """A load that is broken off may run the script, and then has what it draws in."""
-    with served.session("oscillator") as session:
-        whole = served.http.get(session.info["scene"]).text
-        plain = served.http.get(session.info["scene"], headers={"Accept-Encoding": "identity"})
+    with shared_server.session("oscillator") as session:
+        whole = shared_server.http.get(session.info["scene"]).text
+        plain = shared_server.http.get(
+            session.info["scene"], headers={"Accept-Encoding": "identity"}
+        )
     assert whole == plain.text
     assert "content-encoding" not in plain.headers
     ours, script = (found.start() for found in re.finditer("<script", whole))
@@ -33,10 +37,10 @@ def test_the_viewers_script_comes_after_the_element_it_draws_in(served: Served) 
     assert whole[whole.rindex("</script>") :].split() == ["</script></body>", "</html>"]
 
 
-def test_a_view_is_reset_after_a_hand_has_moved_it(served: Served) -> None:
-    with served.session("oscillator") as session, SceneClient(session) as scene:
+def test_a_view_is_reset_after_a_hand_has_moved_it(shared_server: ServerProcess) -> None:
+    with shared_server.session("oscillator") as session, SceneClient(session) as scene:
         session.command("pause")
-        scene.socket.send(camera((9.0, 9.0, 9.0)))
+        scene.socket.send(camera_message((9.0, 9.0, 9.0)))
 
         def is_placed() -> bool:
             session.command("reset_view")  # which may overtake the hand, on a way of its own
@@ -46,15 +50,15 @@ def test_a_view_is_reset_after_a_hand_has_moved_it(served: Served) -> None:
                         return bool(np.linalg.norm(found["position"]) < 6.0)
             return False
 
-        until(is_placed)
+        wait_until(is_placed)
 
 
-def test_the_robot_is_a_tree_of_its_joints(served: Served) -> None:
+def test_the_robot_is_a_tree_of_its_joints(shared_server: ServerProcess) -> None:
     chain = (
         "shoulder_pan_joint/shoulder_lift_joint/elbow_joint/wrist_1_joint/wrist_2_joint"
         "/wrist_3_joint"
     )
-    with served.session("joint-control") as session, SceneClient(session) as scene:
+    with shared_server.session("joint-control") as session, SceneClient(session) as scene:
         turned: Counter[str] = Counter()
         for found, _ in zip(scene.messages(), range(600), strict=False):
             if found["type"] == "SetOrientationMessage":
@@ -67,40 +71,40 @@ def test_the_robot_is_a_tree_of_its_joints(served: Served) -> None:
         assert set(placed.values()) <= {1}, "what a joint carries is placed once"
 
 
-def test_a_slider_in_the_panel_changes_the_world_and_the_page(served: Served) -> None:
+def test_a_slider_in_the_panel_changes_the_world_and_the_page(shared_server: ServerProcess) -> None:
     with (
-        served.session("oscillator") as session,
+        shared_server.session("oscillator") as session,
         session.stream() as stream,
         SceneClient(session) as scene,
     ):
         scene.set("ω", 0.7475)  # from 0.1 to 10
         changed = stream.next("status", lambda s: s["params"]["omega"] == 7.5)
         assert changed["run"] == 1, "a live parameter restarts nothing"
-        scene.says("ω", "ω = 7.5 rad/s")
+        scene.wait_for_label("ω", "ω = 7.5 rad/s")
         scene.set("k_p", 1.0)
         stream.next("status", lambda s: s["params"]["gain"] == 1000.0)
-        scene.says("k_p", "k_p = 1000 1/s")
+        scene.wait_for_label("k_p", "k_p = 1000 1/s")
         scene.set("k_p", 0.0)
         stream.next("status", lambda s: s["params"]["gain"] == 0.0)
-        scene.says("k_p", "k_p = 0 1/s")
+        scene.wait_for_label("k_p", "k_p = 0 1/s")
 
 
-def test_a_change_through_the_api_moves_the_panel(served: Served) -> None:
-    with served.session("oscillator") as session, SceneClient(session) as scene:
+def test_a_change_through_the_api_moves_the_panel(shared_server: ServerProcess) -> None:
+    with shared_server.session("oscillator") as session, SceneClient(session) as scene:
         session.set(omega=5.05, shape="square", noisy=True, gain=1.2345)
-        scene.says("ω", "ω = 5.05 rad/s")
-        scene.shows("ω", 0.5)
-        scene.shows("Shape", "Square")
-        scene.shows("Noise", True)
-        scene.says("k_p", "k_p = 1.2345 1/s")
+        scene.wait_for_label("ω", "ω = 5.05 rad/s")
+        scene.wait_for_value("ω", 0.5)
+        scene.wait_for_value("Shape", "Square")
+        scene.wait_for_value("Noise", True)
+        scene.wait_for_label("k_p", "k_p = 1.2345 1/s")
 
 
-def test_the_panel_has_what_matters_first_where_it_acts(served: Served) -> None:
-    with served.session("joint-control") as session, SceneClient(session) as scene:
+def test_the_panel_has_what_matters_first_where_it_acts(shared_server: ServerProcess) -> None:
+    with shared_server.session("joint-control") as session, SceneClient(session) as scene:
         scene.control("Push")
         keys = {
             tunable.label
-            for tunable in find("joint-control").lab.Params.tunables.values()
+            for tunable in find_lab("joint-control").lab.Params.tunables.values()
             if tunable.key
         }
         assert set(scene.controls) == {*keys, "Push"}
@@ -111,9 +115,9 @@ def test_the_panel_has_what_matters_first_where_it_acts(served: Served) -> None:
         )
 
 
-def test_the_panels_button_presses_the_action(served: Served) -> None:
+def test_the_panels_button_presses_the_action(shared_server: ServerProcess) -> None:
     with (
-        served.session("oscillator") as session,
+        shared_server.session("oscillator") as session,
         session.stream() as stream,
         SceneClient(session) as scene,
     ):
@@ -121,7 +125,7 @@ def test_the_panels_button_presses_the_action(served: Served) -> None:
         stream.next("telemetry", lambda m: m["rows"] and m["rows"][-1][5] == 1.0)
 
 
-def test_a_dragged_handle_reaches_the_world(served: Served) -> None:
+def test_a_dragged_handle_reaches_the_world(shared_server: ServerProcess) -> None:
     def drag(phase: str, x: float) -> bytes:
         return message(
             "SceneNodeDragMessage",
@@ -138,7 +142,7 @@ def test_a_dragged_handle_reaches_the_world(served: Served) -> None:
         )
 
     with (
-        served.session("oscillator") as session,
+        shared_server.session("oscillator") as session,
         session.stream() as stream,
         SceneClient(session) as scene,
     ):
@@ -193,7 +197,7 @@ def test_a_robot_in_anothers_place_has_nodes_of_its_own() -> None:
         past: set[str] = set()
         scene.trail("robot 1", np.zeros((2, 3)))  # a name of the lab's own
         trail = server.scene._handle_from_node_name["/robot 1"]
-        for arm in (load("double-pendulum"), load("ur5"), load("double-pendulum")):
+        for arm in (load_arm("double-pendulum"), load_arm("ur5"), load_arm("double-pendulum")):
             for ghost in (False, True):
                 scene.arm("robot", arm, arm.home, ghost=ghost)
                 assert nodes()
@@ -208,8 +212,8 @@ def test_a_robot_in_anothers_place_has_nodes_of_its_own() -> None:
         server.stop()
 
 
-def test_the_scene_of_an_unknown_session_is_closed_for_good(served: Served) -> None:
-    address = served.address.replace("http", "ws") + "/scene/guess"
+def test_the_scene_of_an_unknown_session_is_closed_for_good(shared_server: ServerProcess) -> None:
+    address = shared_server.address.replace("http", "ws") + "/scene/guess"
     with connect(address, subprotocols=[PROTOCOL]) as socket:  # type: ignore[list-item]
         with pytest.raises(ConnectionClosed) as closed:
             socket.recv()
@@ -217,13 +221,13 @@ def test_the_scene_of_an_unknown_session_is_closed_for_good(served: Served) -> N
         assert closed.value.rcvd.code == 4404
 
 
-def test_a_client_of_another_protocol_is_refused(served: Served) -> None:
-    with served.session("oscillator") as session, pytest.raises(InvalidStatus):
-        connect(served.address.replace("http", "ws") + session.info["scene"].rstrip("/"))
+def test_a_client_of_another_protocol_is_refused(shared_server: ServerProcess) -> None:
+    with shared_server.session("oscillator") as session, pytest.raises(InvalidStatus):
+        connect(shared_server.address.replace("http", "ws") + session.info["scene"].rstrip("/"))
 
 
-def test_the_view_can_be_changed_while_it_runs(served: Served) -> None:
-    with served.session("joint-control") as session, SceneClient(session) as scene:
+def test_the_view_can_be_changed_while_it_runs(shared_server: ServerProcess) -> None:
+    with shared_server.session("joint-control") as session, SceneClient(session) as scene:
         session.command("view", view={"dark": True, "graphics": "low"})
         scene.read_until(lambda m: m["type"] == "ThemeConfigurationMessage" and m["dark_mode"])
         scene.read_until(lambda m: "Mesh" in m["type"] and "wrist_3_joint" in m.get("name", ""))

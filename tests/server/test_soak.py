@@ -9,9 +9,9 @@ from typing import Any
 import psutil
 import pytest
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.params import Choice, Knob, Toggle, Tunable, Value
-from tests.served import Opened, Served
+from tests.server_process import ServerProcess, SessionClient
 
 LABS = ["joint-control", "dynamics", "lqr", "ddp", "td-control", "mpc"]
 CHANGES = 100_000
@@ -35,7 +35,7 @@ def values_of(tunable: Tunable, dice: random.Random) -> Value | None:
 
 def requests(slug: str, dice: random.Random, count: int) -> Iterator[dict[str, Any]]:
     """Changes, and now and then a command."""
-    tunables = find(slug).lab.Params.tunables
+    tunables = find_lab(slug).lab.Params.tunables
     for _ in range(count):
         name = dice.choice(list(tunables))
         value = values_of(tunables[name], dice)
@@ -47,7 +47,7 @@ def requests(slug: str, dice: random.Random, count: int) -> Iterator[dict[str, A
             yield {"type": "command", "command": {"command": command, **more}}
 
 
-def play(session: Opened, seed: int, count: int) -> None:
+def play(session: SessionClient, seed: int, count: int) -> None:
     """Each change waits for its answer; a refusal is one, too."""
     with session.stream(max_size=None) as stream:
         dice = random.Random(seed)
@@ -57,7 +57,7 @@ def play(session: Opened, seed: int, count: int) -> None:
                 pass
 
 
-def memory(server: Served) -> dict[int, int]:
+def memory(server: ServerProcess) -> dict[int, int]:
     """[bytes] Of each process, the web process and the workers."""
     processes = [psutil.Process(server.process.pid), *server.workers()]
     return {process.pid: process.memory_full_info().uss for process in processes}
@@ -65,9 +65,9 @@ def memory(server: Served) -> dict[int, int]:
 
 def soak(changes: int) -> None:
     """Raises AssertionError where a process grew, or was replaced."""
-    server = Served(ORCLAB_HANG_SECONDS="60", ORCLAB_VIEWERLESS_SECONDS="86400")
+    server = ServerProcess(ORCLAB_HANG_SECONDS="60", ORCLAB_VIEWERLESS_SECONDS="86400")
     with server, ThreadPoolExecutor(len(LABS)) as pool:
-        opened = [Opened.new(server, slug, {}) for slug in LABS]
+        opened = [SessionClient.new(server, slug, {}) for slug in LABS]
         sizes = []
         for seed, part in enumerate((WARM, 1.0 - WARM)):
             count = round(part * changes / len(LABS))

@@ -12,41 +12,41 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from labs.engine.catalog import find
-from labs.engine.events import events_of
-from labs.engine.headless import run
+from labs.engine.catalog import find_lab
+from labs.engine.events import events_from_recording
+from labs.engine.headless import run_headless
 from labs.engine.run import World
 from labs.engine.solution import Solution
 from server.cli import main
 from server.messages import SolverStatus
 from server.solver_clock import SolverClock
-from tests.served import Opened, Served, until
+from tests.server_process import ServerProcess, SessionClient, wait_until
 
 LONG = {"many": 1000.0, "rate": 0.01}
 
 
-def standing(session: Opened) -> Any:
+def solver_status(session: SessionClient) -> Any:
     """The solver's status, now; None where there is no solver."""
     with session.stream() as stream:
         return stream.next("status")["solver"]
 
 
-def put(session: Opened, content: bytes) -> httpx.Response:
+def put(session: SessionClient, content: bytes) -> httpx.Response:
     return session.server.http.put(f"{session.path}/solution", content=content)
 
 
-def get(session: Opened, form: str) -> httpx.Response:
+def get(session: SessionClient, form: str) -> httpx.Response:
     return session.server.http.get(f"{session.path}/solution.{form}")
 
 
-def replayed(about: dict[str, Any]) -> World:
+def replay(about: dict[str, Any]) -> World:
     """The same run, made headless from an export."""
-    return run(
+    return run_headless(
         about["lab"],
         about["params"],
         seed=about["seed"],
         seconds=about["covers"]["to"],
-        events=events_of(about),
+        events=events_from_recording(about),
         solution=Solution.from_dict(about["solution"]) if "solution" in about else None,
     )
 
@@ -55,7 +55,7 @@ def replayed(about: dict[str, Any]) -> World:
 
 
 def test_a_pace_lets_through_as_many_as_are_due() -> None:
-    world = World(find("descent"))
+    world = World(find_lab("descent"))
     clock = SolverClock(world, None)
     clock.dispatch("pace", pace=10.0)
     done = []
@@ -68,7 +68,7 @@ def test_a_pace_lets_through_as_many_as_are_due() -> None:
 
 
 def test_time_left_is_told_from_progress_and_its_own_time() -> None:
-    world = World(find("descent"))
+    world = World(find_lab("descent"))
     clock = SolverClock(world, None)
     clock.dispatch("pace", pace=10.0)
     for frame in range(601):
@@ -87,7 +87,7 @@ def test_time_left_is_told_from_progress_and_its_own_time() -> None:
 
 
 def test_steps_that_are_owed_end_with_their_solver() -> None:
-    world = World(find("descent"))
+    world = World(find_lab("descent"))
     clock = SolverClock(world, {"running": False, "pace": 0.0})
     clock.dispatch("step", count=5)
     world.change({"rate": 0.01})
@@ -99,7 +99,7 @@ def test_steps_that_are_owed_end_with_their_solver() -> None:
 
 
 def test_an_iteration_in_pieces_is_one_iteration() -> None:
-    world = World(find("descent"))
+    world = World(find_lab("descent"))
     clock = SolverClock(world, {"running": False, "pace": 0.0})
     clock.dispatch("step", count=2)
     found = []
@@ -124,8 +124,8 @@ def test_an_iteration_in_pieces_is_one_iteration() -> None:
 # Live -----------------------------------------------------------------------------------------
 
 
-def test_it_runs_by_itself_and_says_how_it_stands(served: Served) -> None:
-    with served.session("descent") as session, session.stream() as stream:
+def test_it_runs_by_itself_and_says_how_it_stands(shared_server: ServerProcess) -> None:
+    with shared_server.session("descent") as session, session.stream() as stream:
         solver = stream.next("status", lambda s: s["solver"]["done"])["solver"]
         assert solver == {
             "iteration": 200,
@@ -139,8 +139,10 @@ def test_it_runs_by_itself_and_says_how_it_stands(served: Served) -> None:
         }
 
 
-def test_numbers_follow_the_solver_while_the_world_stands_still(served: Served) -> None:
-    with served.session("descent", params=LONG) as session, session.stream() as stream:
+def test_numbers_follow_the_solver_while_the_world_stands_still(
+    shared_server: ServerProcess,
+) -> None:
+    with shared_server.session("descent", params=LONG) as session, session.stream() as stream:
         columns = stream.next("hello")["columns"]
         at = columns.index("best")
         session.command("solver_pause")
@@ -156,11 +158,11 @@ def test_numbers_follow_the_solver_while_the_world_stands_still(served: Served) 
 
 
 def test_numbers_are_the_last_ones_where_a_solver_brings_the_world_to_a_halt(
-    served: Served,
+    shared_server: ServerProcess,
 ) -> None:
     """The weights of Baird's star diverge; the last row was measured before."""
     star = {"world": "star", "alpha": 0.01, "updates": 5000.0}
-    with served.session("function-approximation", params=star) as session:
+    with shared_server.session("function-approximation", params=star) as session:
         with session.stream() as stream:
             status = stream.next("status", lambda s: s["trouble"])
         with session.stream() as stream:
@@ -170,9 +172,9 @@ def test_numbers_are_the_last_ones_where_a_solver_brings_the_world_to_a_halt(
             assert stream.next("telemetry", lambda m: m["now"] and m["now"][at] == updates)
 
 
-def test_a_lab_without_a_solver_says_so(served: Served) -> None:
-    with served.session("troublesome") as session:
-        assert standing(session) is None
+def test_a_lab_without_a_solver_says_so(shared_server: ServerProcess) -> None:
+    with shared_server.session("troublesome") as session:
+        assert solver_status(session) is None
         answer = session.command("solver_pause")
         assert answer.status_code == 422
         assert "no solver" in answer.json()["error"]
@@ -180,14 +182,14 @@ def test_a_lab_without_a_solver_says_so(served: Served) -> None:
         assert put(session, b"{}").status_code == 422
 
 
-def test_run_pause_step_and_pace(served: Served) -> None:
-    with served.session("descent", params=LONG) as session, session.stream() as stream:
+def test_run_pause_step_and_pace(shared_server: ServerProcess) -> None:
+    with shared_server.session("descent", params=LONG) as session, session.stream() as stream:
         session.command("solver_pace", pace=20)
         session.command("reset")
         stream.next("status", lambda s: 3 < s["solver"]["latest"] < 900)
         session.command("solver_pause")
         paused = stream.next("status", lambda s: not s["solver"]["running"])["solver"]
-        assert standing(session)["latest"] == paused["latest"] < 900
+        assert solver_status(session)["latest"] == paused["latest"] < 900
         assert session.command("solver_step", count=7).status_code == 204
         stepped = stream.next("status", lambda s: s["solver"]["latest"] > paused["latest"] + 6)
         assert stepped["solver"]["latest"] == paused["latest"] + 7
@@ -197,8 +199,8 @@ def test_run_pause_step_and_pace(served: Served) -> None:
         assert stream.next("status", lambda s: s["solver"]["done"])["solver"]["latest"] == 1000
 
 
-def test_the_two_clocks_do_not_hold_each_other(served: Served) -> None:
-    with served.session("oscillator") as session, session.stream() as stream:
+def test_the_two_clocks_do_not_hold_each_other(shared_server: ServerProcess) -> None:
+    with shared_server.session("oscillator") as session, session.stream() as stream:
         session.command("solver_pause")
         session.set(guess=50.0)
         held = stream.next("status", lambda s: s["params"]["guess"] == 50.0)
@@ -212,8 +214,10 @@ def test_the_two_clocks_do_not_hold_each_other(served: Served) -> None:
 
 
 @pytest.mark.parametrize("how", ["reset", "change"])
-def test_a_solver_that_is_paused_stays_so_when_it_starts_anew(served: Served, how: str) -> None:
-    with served.session("descent") as session, session.stream() as stream:
+def test_a_solver_that_is_paused_stays_so_when_it_starts_anew(
+    shared_server: ServerProcess, how: str
+) -> None:
+    with shared_server.session("descent") as session, session.stream() as stream:
         stream.next("status", lambda s: s["solver"]["done"])
         session.command("solver_pause")
         session.command("reset") if how == "reset" else session.set(rate=0.02)
@@ -224,8 +228,10 @@ def test_a_solver_that_is_paused_stays_so_when_it_starts_anew(served: Served, ho
         stream.next("status", lambda s: s["solver"]["latest"] == 1)
 
 
-def test_looking_back_pauses_and_running_goes_on_from_the_latest(served: Served) -> None:
-    with served.session("descent", params=LONG) as session, session.stream() as stream:
+def test_looking_back_pauses_and_running_goes_on_from_the_latest(
+    shared_server: ServerProcess,
+) -> None:
+    with shared_server.session("descent", params=LONG) as session, session.stream() as stream:
         session.command("solver_pace", pace=50)
         session.command("reset")
         stream.next("status", lambda s: 10 < s["solver"]["latest"] < 900)
@@ -240,8 +246,8 @@ def test_looking_back_pauses_and_running_goes_on_from_the_latest(served: Served)
         assert on["iteration"] >= back["latest"]
 
 
-def test_looking_back_at_nothing_is_refused(served: Served) -> None:
-    with served.session("descent") as session:
+def test_looking_back_at_nothing_is_refused(shared_server: ServerProcess) -> None:
+    with shared_server.session("descent") as session:
         session.command("solver_pause")
         session.command("reset")
         answer = session.command("solver_show", iteration=3)
@@ -260,13 +266,17 @@ def test_looking_back_at_nothing_is_refused(served: Served) -> None:
         ("solver_pace", {"pace": 1e9}),
     ],
 )
-def test_wrong_commands_are_refused(served: Served, command: str, more: dict[str, Any]) -> None:
-    with served.session("descent") as session:
+def test_wrong_commands_are_refused(
+    shared_server: ServerProcess, command: str, more: dict[str, Any]
+) -> None:
+    with shared_server.session("descent") as session:
         assert session.command(command, **more).status_code == 422
 
 
-def test_whatever_the_pace_was_the_run_is_replayed_bit_for_bit(served: Served) -> None:
-    with served.session("oscillator", params={"guess": 90.0}) as session:
+def test_whatever_the_pace_was_the_run_is_replayed_bit_for_bit(
+    shared_server: ServerProcess,
+) -> None:
+    with shared_server.session("oscillator", params={"guess": 90.0}) as session:
         with session.stream() as stream:
             session.command("solver_pace", pace=8)
             session.command("reset")
@@ -279,18 +289,18 @@ def test_whatever_the_pace_was_the_run_is_replayed_bit_for_bit(served: Served) -
             stream.next("status", lambda s: s["solver"]["done"])
         session.command("pause")
         live = session.export()
-        line = served.http.get(f"{session.path}/command").json()["command"]
-    headless = replayed(live)
+        line = shared_server.http.get(f"{session.path}/command").json()["command"]
+    headless = replay(live)
     again = headless.recorder.channels()
     assert live["channels"]["root"] == again["root"].tolist()
     assert len(set(live["channels"]["root"])) > 6
     assert "show=2" in line
 
 
-def test_a_replaced_worker_keeps_the_pace_and_the_pause(served: Served) -> None:
-    until(lambda: served.health()["workers"] == served.health()["spares"] == 1)
-    before = set(served.listeners())
-    with served.session("descent") as session, session.stream() as stream:
+def test_a_replaced_worker_keeps_the_pace_and_the_pause(shared_server: ServerProcess) -> None:
+    wait_until(lambda: shared_server.health()["workers"] == shared_server.health()["spares"] == 1)
+    before = set(shared_server.listeners())
+    with shared_server.session("descent") as session, session.stream() as stream:
         session.command("solver_pace", pace=5)
         session.command("solver_pause")
         stream.next("status", lambda s: s["solver"]["pace"] == 5 and not s["solver"]["running"])
@@ -305,9 +315,12 @@ def test_a_replaced_worker_keeps_the_pace_and_the_pause(served: Served) -> None:
 
 
 @pytest.mark.parametrize("form", ["json", "npz"])
-def test_a_solution_is_saved_and_loaded_elsewhere(served: Served, form: str) -> None:
+def test_a_solution_is_saved_and_loaded_elsewhere(shared_server: ServerProcess, form: str) -> None:
     params = {"rate": 0.03, "many": 120.0}
-    with served.session("descent", params=params, seed=5) as session, session.stream() as stream:
+    with (
+        shared_server.session("descent", params=params, seed=5) as session,
+        session.stream() as stream,
+    ):
         stream.next("status", lambda s: s["solver"]["done"])
         session.command("solver_show", iteration=60)
         answer = get(session, form)
@@ -317,7 +330,7 @@ def test_a_solution_is_saved_and_loaded_elsewhere(served: Served, form: str) -> 
         assert arrays["point.path"].shape == (61, 2)
         about = json.loads(str(arrays["about"]))
         assert (about["lab"], about["iteration"], about["seed"]) == ("descent", 60, 5)
-    with served.session("descent") as other, other.stream() as stream:
+    with shared_server.session("descent") as other, other.stream() as stream:
         loaded = put(other, answer.content)
         assert loaded.status_code == 200, loaded.text
         assert loaded.json()["params"].items() >= params.items()
@@ -325,27 +338,27 @@ def test_a_solution_is_saved_and_loaded_elsewhere(served: Served, form: str) -> 
         assert told["seed"] == 5
         assert told["solver"]["iteration"] == told["solver"]["latest"] == 60
         assert not told["solver"]["running"]
-        assert served.http.get(other.path).json()["params"]["rate"] == 0.03
+        assert shared_server.http.get(other.path).json()["params"]["rate"] == 0.03
         other.command("solver_run")
         ended = stream.next("status", lambda s: s["solver"]["done"])["solver"]
         assert ended["latest"] == 180, "it went on from there"
         live = other.export()
-    world = replayed(live)
+    world = replay(live)
     assert world.state.steps == 180
     assert live["solution"]["iteration"] == 60
 
 
 def test_a_recording_after_loading_runs_again_from_the_command_line(
-    served: Served, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    shared_server: ServerProcess, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with served.session("oscillator", params={"guess": 90.0}) as session:
+    with shared_server.session("oscillator", params={"guess": 90.0}) as session:
         with session.stream() as stream:
             stream.next("status", lambda s: s["solver"]["done"])
             assert put(session, get(session, "npz").content).status_code == 200
             stream.next("status", lambda s: s["t"] > 0.2)
         session.command("pause")
         live = session.export()
-        refused = served.http.get(f"{session.path}/command")
+        refused = shared_server.http.get(f"{session.path}/command")
     assert refused.status_code == 422
     assert "--replay" in refused.json()["error"]
     (tmp_path / "run.json").write_text(json.dumps(live))
@@ -354,8 +367,8 @@ def test_a_recording_after_loading_runs_again_from_the_command_line(
     assert json.loads(again.read_bytes())["channels"] == live["channels"]
 
 
-def test_a_refused_solution_leaves_the_session_as_it_was(served: Served) -> None:
-    with served.session("oscillator") as session, session.stream() as stream:
+def test_a_refused_solution_leaves_the_session_as_it_was(shared_server: ServerProcess) -> None:
+    with shared_server.session("oscillator") as session, session.stream() as stream:
         stream.next("status", lambda s: s["solver"]["done"] and s["t"] > 0.1)
         good = get(session, "json").json()
         wrong = [
@@ -374,16 +387,18 @@ def test_a_refused_solution_leaves_the_session_as_it_was(served: Served) -> None
         assert not now["trouble"]
 
 
-def test_a_solution_may_be_larger_than_other_bodies_but_not_any_size(served: Served) -> None:
-    with served.session("oscillator") as session:
+def test_a_solution_may_be_larger_than_other_bodies_but_not_any_size(
+    shared_server: ServerProcess,
+) -> None:
+    with shared_server.session("oscillator") as session:
         assert put(session, b" " * 100_000).status_code == 422
         assert put(session, b" " * (2**24 + 1)).status_code == 413
         parts = (b" " * 2**20 for _ in range(40))  # without a length
         assert put(session, parts).status_code == 413  # type: ignore[arg-type]
 
 
-def test_nothing_found_yet_is_told(served: Served) -> None:
-    with served.session("descent") as session:
+def test_nothing_found_yet_is_told(shared_server: ServerProcess) -> None:
+    with shared_server.session("descent") as session:
         session.command("solver_pause")
         session.command("reset")
         answer = get(session, "npz")

@@ -10,31 +10,31 @@ from typing import Any
 
 import pytest
 
-from labs.engine.catalog import find
-from server import starting, supervisor, waking_clock
+from labs.engine.catalog import find_lab
+from server import supervisor, uptime_clock, worker_start
 from server.messages import NewSession
-from server.pipe import CONTROL, HEADER, encode, frame
-from server.session import Unavailable
+from server.pipe import CONTROL, HEADER, encode_frame, encode_json
+from server.session import SessionUnavailable
 from server.sessions import Sessions
 from server.settings import Settings
 from server.supervisor import Supervisor, Worker, WorkerGone
-from server.waking_clock import WakingClock
-from tests.served import run_apart
+from server.uptime_clock import UptimeClock
+from tests.server_process import run_in_thread
 
 LIMIT = 0.2
 
 
 @pytest.fixture(autouse=True)
-def hurried(monkeypatch: pytest.MonkeyPatch) -> None:
+def short_limits(monkeypatch: pytest.MonkeyPatch) -> None:
     """A clock that ticks fast, and limits that are short."""
-    monkeypatch.setattr(waking_clock, "TICK", 0.01)
-    monkeypatch.setattr(waking_clock, "LONGEST", 0.05)
+    monkeypatch.setattr(uptime_clock, "TICK", 0.01)
+    monkeypatch.setattr(uptime_clock, "MAX_TICK", 0.05)
     monkeypatch.setattr(supervisor, "REQUEST_SECONDS", LIMIT)
-    monkeypatch.setattr(starting, "START_SECONDS", LIMIT)
+    monkeypatch.setattr(worker_start, "START_SECONDS", LIMIT)
 
 
 @contextlib.asynccontextmanager
-async def ticking(clock: WakingClock) -> AsyncIterator[None]:
+async def ticking_clock(clock: UptimeClock) -> AsyncIterator[None]:
     async def tick() -> None:
         while True:
             await clock.tick()
@@ -74,10 +74,10 @@ def test_a_nap_uses_up_no_time_of_a_request() -> None:
     async def work() -> Any:
         ours, theirs = socket.socketpair()
         reader, writer = await asyncio.open_connection(sock=theirs)
-        clock = WakingClock()
+        clock = UptimeClock()
         worker = Worker(Process(), ours, clock)
-        writer.write(frame(CONTROL, encode({"ready": True, "port": 1})))
-        async with ticking(clock):
+        writer.write(encode_frame(CONTROL, encode_json({"ready": True, "port": 1})))
+        async with ticking_clock(clock):
             await worker.wait_until_ready()
             asking = asyncio.create_task(worker.ask("params"))
             size, _ = HEADER.unpack(await reader.readexactly(HEADER.size))
@@ -85,14 +85,14 @@ def test_a_nap_uses_up_no_time_of_a_request() -> None:
             time.sleep(2 * LIMIT)
             await clock.tick()
             await asyncio.sleep(0)
-            writer.write(frame(CONTROL, encode({"ref": 1, "answer": 7, "error": ""})))
+            writer.write(encode_frame(CONTROL, encode_json({"ref": 1, "answer": 7, "error": ""})))
             assert await asking == 7
             with pytest.raises(WorkerGone, match="does not answer"):
                 await worker.ask("params")
         writer.close()
         ours.close()
 
-    run_apart(work())
+    run_in_thread(work())
 
 
 def test_a_start_that_does_not_end_frees_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -108,9 +108,9 @@ def test_a_start_that_does_not_end_frees_its_place(monkeypatch: pytest.MonkeyPat
 
         monkeypatch.setattr(stuck._context, "Process", process, raising=False)
         sessions = Sessions(Settings(max_sessions=1), stuck)
-        async with ticking(stuck.clock):
-            with pytest.raises(Unavailable, match=r"none began within 0\.2 s.*try again"):
-                await sessions.create(find("oscillator"), NewSession(lab="oscillator"))
+        async with ticking_clock(stuck.clock):
+            with pytest.raises(SessionUnavailable, match=r"none began within 0\.2 s.*try again"):
+                await sessions.create(find_lab("oscillator"), NewSession(lab="oscillator"))
         assert len(sessions) == 0
         (late,) = processes
         other_end = late.pipe.dup()
@@ -120,4 +120,4 @@ def test_a_start_that_does_not_end_frees_its_place(monkeypatch: pytest.MonkeyPat
         assert other_end.recv(1) == b"", "nobody is at the other end"
         other_end.close()
 
-    run_apart(work())
+    run_in_thread(work())

@@ -11,8 +11,8 @@ import numpy as np
 
 from labs.algorithms.absolute_stability import (
     StabilityFunction,
+    bisect_stability_limit,
     largest_stable_step,
-    measured_stability_limit,
     stability_boundary,
 )
 from labs.algorithms.butcher_tableau import Tableau, parse_tableau
@@ -96,7 +96,7 @@ def _largest_stable_step(text: str, rods: int, friction: float) -> float:
     if text != "semi":
         found = largest_stable_step(StabilityFunction.of(tableau_of(text)), plant.eigenvalues)
     else:
-        found = measured_stability_limit(
+        found = bisect_stability_limit(
             lambda h: _semi_implicit_growth(plant, h), SHORTEST_STEP, LONGEST_STEP
         )
     return min(found, LONGEST_STEP)
@@ -111,7 +111,9 @@ def growth_of_step(text: str, rods: int, friction: float) -> np.ndarray:
     if text == "semi":
         found = np.array([_semi_implicit_growth(plant, h) for h in GROWTH_STEPS])
     else:
-        found = StabilityFunction.of(tableau_of(text)).growth(GROWTH_STEPS, plant.eigenvalues)
+        found = StabilityFunction.of(tableau_of(text)).spectral_radius(
+            GROWTH_STEPS, plant.eigenvalues
+        )
     capped: np.ndarray = np.minimum(np.nan_to_num(found, nan=HIGHEST_GROWTH), HIGHEST_GROWTH)
     return capped
 

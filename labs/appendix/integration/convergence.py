@@ -21,7 +21,7 @@ OneStepMethod = Callable[[np.ndarray, float, float], RungeKuttaStep]
 
 ROUNDING, ASYMPTOTIC = 1e-12, 0.5
 """Errors below the one are rounding, above the other too large to follow their power of h."""
-FITTED = 3
+FIT_POINTS = 3
 """Points a slope is fitted to: those of the smallest steps."""
 
 
@@ -63,7 +63,7 @@ def fitted_order(h: np.ndarray, errors: np.ndarray) -> float:
     """d log(error) / d log(h), fitted to the smallest steps whose errors say anything; NaN when
     there are fewer than two."""
     use = np.flatnonzero((errors > ROUNDING) & (errors < ASYMPTOTIC))
-    use = use[np.argsort(h[use])][:FITTED]
+    use = use[np.argsort(h[use])][:FIT_POINTS]
     if len(use) < 2:
         return float("nan")
     return float(np.polyfit(np.log(h[use]), np.log(errors[use]), 1)[0])

@@ -7,7 +7,7 @@ import numpy as np
 
 from labs.algorithms.butcher_tableau import parse_tableau
 from labs.models.pendulums import Pendulum, pendulum
-from labs.params import Group, Params, readable
+from labs.params import Group, Params, validated_by
 
 METHOD_TITLES = {
     "euler": "Euler",
@@ -45,7 +45,7 @@ STEPPING = Group("Methods", effect="solve")
 
 
 @lru_cache(maxsize=16)
-def _spelled(text: str, pick: int) -> str:
+def _canonical_tableau(text: str, pick: int) -> str:
     return parse_tableau(text, pick).text
 
 
@@ -66,7 +66,7 @@ class IntegrationParams(Params):
     """Of all methods alike. A pendulum stands still between two steps."""
     implicit: str = STEPPING.choice("implicit-midpoint", IMPLICIT_METHODS, "Implicit method")
     """Which one the gray pendulum follows; its stages are found by Newton's method."""
-    tableau: Annotated[str, readable(parse_tableau)] = STEPPING.text(
+    tableau: Annotated[str, validated_by(parse_tableau)] = STEPPING.text(
         "0 |\n1/3 | 1/3\n2/3 | 0 2/3\n| 1/4 0 3/4", "Your tableau", rows=6, max_length=1500
     )
     """A row a stage, c | a ..., then | b ... at the end, or two of an embedded pair. Fractions go,
@@ -85,7 +85,7 @@ class IntegrationParams(Params):
     @property
     def own_tableau(self) -> str:
         """Your tableau, spelt out, with the row of b that counts."""
-        return _spelled(self.tableau, list(PAIR).index(self.pair))
+        return _canonical_tableau(self.tableau, list(PAIR).index(self.pair))
 
     def x0(self) -> np.ndarray:
         """(2 nq,) the start, [rad] and [rad/s]."""

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from labs.algorithms.lyapunov import solve_lyapunov
-from labs.appendix.lyapunov.closed_loop import TINY, ClosedLoop
-from labs.models.mass_on_a_line import MASS
+from labs.appendix.lyapunov.closed_loop import DIFFERENCE_STEP, ClosedLoop
+from labs.models.mass_on_a_line import BLOCK_MASS
 from labs.resumable import Resumable, run_to_completion
-from labs.tasks.phase_plane.systems import INERTIA, WEIGHT
+from labs.tasks.phase_plane.systems import GRAVITY_TORQUE, INERTIA
 
 CANDIDATES: Mapping[str, str] = {
     "drawn": "Ellipses, dragged",
@@ -51,51 +51,56 @@ def candidate(name: str, loop: ClosedLoop, ellipse: Ellipse) -> Candidate:
     """The one of this name. Raises LabError for the Lyapunov equation of an unstable loop."""
     match name:
         case "drawn":
-            return quadratic(drawn(ellipse, loop.window))
+            return quadratic_candidate(ellipse_matrix(ellipse, loop.window))
         case "energy":
-            return energy(loop)
+            return energy_candidate(loop)
         case "lyapunov":
-            return quadratic(solve_lyapunov(loop.A, loop.Q))
+            return quadratic_candidate(solve_lyapunov(loop.A, loop.Q))
         case "value" if loop.settings.system == "mpc":
-            return Candidate(lambda X: _planned(loop, X), _planned_near(loop))
+            return Candidate(lambda X: _mpc_cost(loop, X), _mpc_cost_matrix(loop))
         case _:
-            return quadratic(0.5 * loop.riccati)
+            return quadratic_candidate(0.5 * loop.riccati)
 
 
-def quadratic(P: np.ndarray) -> Candidate:
+def quadratic_candidate(P: np.ndarray) -> Candidate:
     """V = x' P x."""
 
-    return Candidate(_at_once(lambda X: np.einsum("ki,ij,kj->k", X, P, X)), P, quadratic=True)
+    return Candidate(_as_resumable(lambda X: np.einsum("ki,ij,kj->k", X, P, X)), P, quadratic=True)
 
 
-def drawn(ellipse: Ellipse, window: tuple[float, float]) -> np.ndarray:
+def ellipse_matrix(ellipse: Ellipse, window: tuple[float, float]) -> np.ndarray:
     """P (2, 2) of the V that is 1 on the ellipse."""
     turn = np.radians(ellipse.angle)
     axes = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]) / window
     return np.asarray(axes.T / [ellipse.axis_1**2, ellipse.axis_2**2] @ axes)
 
 
-def energy(loop: ClosedLoop) -> Candidate:
+def energy_candidate(loop: ClosedLoop) -> Candidate:
     """Kinetic and potential energy, zero at the rest; PD's stiffness is a spring."""
     match loop.settings.system:
         case "pd":
             kp = loop.settings.kp
-            return _mechanical(INERTIA, lambda q: WEIGHT * (1.0 - np.cos(q)) + 0.5 * kp * q**2,
-                0.5 * (WEIGHT + kp))  # fmt: skip
+            return _mechanical_energy(
+                INERTIA,
+                lambda q: GRAVITY_TORQUE * (1.0 - np.cos(q)) + 0.5 * kp * q**2,
+                0.5 * (GRAVITY_TORQUE + kp),
+            )
         case "lqr":
-            return _mechanical(INERTIA, lambda q: -WEIGHT * (1.0 - np.cos(q)), -0.5 * WEIGHT)
+            return _mechanical_energy(
+                INERTIA, lambda q: -GRAVITY_TORQUE * (1.0 - np.cos(q)), -0.5 * GRAVITY_TORQUE
+            )
         case "mpc":
-            return _mechanical(MASS, lambda q: 0.0 * q, 0.0)
+            return _mechanical_energy(BLOCK_MASS, lambda q: 0.0 * q, 0.0)
         case _:
-            return _mechanical(MASS, lambda q: 0.5 * q**2, 0.5)
+            return _mechanical_energy(BLOCK_MASS, lambda q: 0.5 * q**2, 0.5)
 
 
-def _mechanical(inertia: float, potential: Formula, curvature: float) -> Candidate:
+def _mechanical_energy(inertia: float, potential: Formula, curvature: float) -> Candidate:
     P = np.diag([curvature, 0.5 * inertia])
-    return Candidate(_at_once(lambda X: P[1, 1] * X[:, 1] ** 2 + potential(X[:, 0])), P)
+    return Candidate(_as_resumable(lambda X: P[1, 1] * X[:, 1] ** 2 + potential(X[:, 0])), P)
 
 
-def _at_once(formula: Formula) -> Callable[[np.ndarray], Resumable[np.ndarray]]:
+def _as_resumable(formula: Formula) -> Callable[[np.ndarray], Resumable[np.ndarray]]:
     def resumable(X: np.ndarray) -> Resumable[np.ndarray]:
         yield from ()
         return formula(X)
@@ -103,14 +108,14 @@ def _at_once(formula: Formula) -> Callable[[np.ndarray], Resumable[np.ndarray]]:
     return resumable
 
 
-def _planned(loop: ClosedLoop, X: np.ndarray) -> Resumable[np.ndarray]:
+def _mpc_cost(loop: ClosedLoop, X: np.ndarray) -> Resumable[np.ndarray]:
     found = yield from loop.planner.values(X)
     return found.V
 
 
-def _planned_near(loop: ClosedLoop) -> np.ndarray:
+def _mpc_cost_matrix(loop: ClosedLoop) -> np.ndarray:
     """P (2, 2) of V*_N, which is quadratic where no limit is met."""
-    q, v = TINY * np.array(loop.window)
-    V = run_to_completion(_planned(loop, np.array([[q, 0.0], [0.0, v], [q, v]])))
+    q, v = DIFFERENCE_STEP * np.array(loop.window)
+    V = run_to_completion(_mpc_cost(loop, np.array([[q, 0.0], [0.0, v], [q, v]])))
     both = 0.5 * (V[2] - V[0] - V[1]) / (q * v)
     return np.array([[V[0] / q**2, both], [both, V[1] / v**2]])

@@ -25,18 +25,18 @@ LOOPS: Mapping[str, str] = {
     "mpc": "Cart under MPC",
     "vanderpol": "Van der Pol, reversed",
 }
-WINDOWS: Mapping[str, tuple[float, float]] = {
+STATE_WINDOWS: Mapping[str, tuple[float, float]] = {
     "pd": (np.pi, 15.0),
     "lqr": (0.6, 4.0),
     "mpc": (1.25, 1.25),
     "vanderpol": (1.25, 1.5),
 }
 """What is shown, and studied, of q and of v, either way."""
-FAR = 1e3
+STATE_LIMIT = 1e3
 """Where what runs away is stopped."""
-PARTS = 16
+GRID_PIECES = 16
 """In which the grid is stepped."""
-TINY = 1e-4
+DIFFERENCE_STEP = 1e-4
 """In parts of the window, of differences about the origin."""
 
 
@@ -73,7 +73,7 @@ class ClosedLoop:
     """x+ = f(x), with what is linear about it."""
 
     settings: ClosedLoopSettings
-    _grid_ahead: list[np.ndarray] = field(default_factory=list, compare=False, repr=False)
+    _next_grid_states: list[np.ndarray] = field(default_factory=list, compare=False, repr=False)
 
     @property
     def system(self) -> PlaneSystem:
@@ -81,7 +81,7 @@ class ClosedLoop:
 
     @property
     def window(self) -> tuple[float, float]:
-        return WINDOWS[self.settings.system]
+        return STATE_WINDOWS[self.settings.system]
 
     @property
     def Q(self) -> np.ndarray:
@@ -134,33 +134,39 @@ class ClosedLoop:
                 u_max = self.settings.u_max
                 return np.asarray(np.clip(X @ self.gain.T, -u_max, u_max))
 
-    def ahead(self, X: np.ndarray) -> Resumable[np.ndarray]:
+    def next_state(self, X: np.ndarray) -> Resumable[np.ndarray]:
         """f(x) (k, 2) of states X (k, 2)."""
         U = yield from self.control(X)
-        return stopped(self.system.step(X, U, self.settings.T))
+        return clip_states(self.system.step(X, U, self.settings.T))
 
-    def grid_ahead(self, X: np.ndarray) -> Resumable[np.ndarray]:
+    def next_grid_states(self, X: np.ndarray) -> Resumable[np.ndarray]:
         """f(x) (k, 2) of the grid of its window, which is always the same: found once."""
-        if not self._grid_ahead:
+        if not self._next_grid_states:
             parts = []
-            for part in np.array_split(X, PARTS):
-                parts.append((yield from self.ahead(part)))
+            for part in np.array_split(X, GRID_PIECES):
+                parts.append((yield from self.next_state(part)))
                 yield
-            self._grid_ahead.append(np.concatenate(parts))
-        return self._grid_ahead[0]
+            self._next_grid_states.append(np.concatenate(parts))
+        return self._next_grid_states[0]
 
     @cached_property
     def A(self) -> np.ndarray:
         """(2, 2): df/dx at the rest, by central differences; of LQR and MPC it is exact."""
-        sizes = TINY * np.array(self.window)
+        sizes = DIFFERENCE_STEP * np.array(self.window)
         X = np.vstack([np.diag(sizes), -np.diag(sizes)])
-        F = run_to_completion(self.ahead(X))
+        F = run_to_completion(self.next_state(X))
         return np.asarray(((F[:2] - F[2:]) / (2.0 * sizes[:, None])).T)
 
 
-def stopped(X: np.ndarray) -> np.ndarray:
-    """X, with what ran away stopped at FAR."""
-    return np.asarray(np.clip(np.nan_to_num(X, nan=FAR, posinf=FAR, neginf=-FAR), -FAR, FAR))
+def clip_states(X: np.ndarray) -> np.ndarray:
+    """X, with what ran away stopped at STATE_LIMIT."""
+    return np.asarray(
+        np.clip(
+            np.nan_to_num(X, nan=STATE_LIMIT, posinf=STATE_LIMIT, neginf=-STATE_LIMIT),
+            -STATE_LIMIT,
+            STATE_LIMIT,
+        )
+    )
 
 
 @lru_cache(maxsize=16)

@@ -7,20 +7,26 @@ from typing import ClassVar
 
 import numpy as np
 
+from labs.appendix.lyapunov.analysis import LyapunovAnalysis, analyse
 from labs.appendix.lyapunov.params import LyapunovParams
-from labs.appendix.lyapunov.picture import draw
+from labs.appendix.lyapunov.picture import draw_phase_plane
 from labs.appendix.lyapunov.plots import PLOTS, conditions, map_fields, run_fields
-from labs.appendix.lyapunov.runs import STEPS, StateEnsemble, advance, let_loose, look
-from labs.appendix.lyapunov.study import LyapunovAnalysis, study
+from labs.appendix.lyapunov.state_ensemble import (
+    RUN_STEPS,
+    StateEnsemble,
+    advance_ensemble,
+    hold_controls,
+    initial_ensemble,
+)
 from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
 from labs.resumable import run_to_completion
 from labs.scene import Scene
-from labs.tasks.phase_plane.systems import STEP
+from labs.tasks.phase_plane.systems import SIMULATION_STEP
 
 START = 0.6
 """Where the body starts, at rest, in parts of the window."""
-OVER = 1e-9
+LEVEL_TOLERANCE = 1e-9
 """By which, in parts of the level, V may be above it by rounding."""
 
 
@@ -52,7 +58,7 @@ class Lyapunov(Lab[LyapunovParams, LyapunovState]):
         "the set that no state leaves, and how fast everything in it comes to rest."
     )
     Params = LyapunovParams
-    period = STEP
+    period = SIMULATION_STEP
     plots = PLOTS
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Pendulum, ellipses": {},
@@ -83,15 +89,15 @@ class Lyapunov(Lab[LyapunovParams, LyapunovState]):
     def step(self, params: LyapunovParams, inputs: Inputs, state: LyapunovState) -> LyapunovState:
         """10 ms of the body and of all states, each under the control held since the law last
         looked."""
-        loop, substeps = params.loop, round(params.period / STEP)
+        loop, substeps = params.loop, round(params.period / SIMULATION_STEP)
         x, u, runs, body_V = state.x, state.u, state.runs, state.body_V
         held = inputs.handles.get("state")
         if held is not None:
             x = params.plane.state_at(held)
         if state.study is not None and (
-            runs is None or runs.k >= STEPS or "release" in inputs.actions
+            runs is None or runs.k >= RUN_STEPS or "release" in inputs.actions
         ):
-            runs = let_loose(state.study.starts)
+            runs = initial_ensemble(state.study.starts)
         due = runs is not None and runs.clock % substeps == 0
         if due or (runs is None and state.steps % substeps == 0) or held is not None:
             many = x[None] if runs is None or not due else np.vstack([x, runs.X])
@@ -101,14 +107,20 @@ class Lyapunov(Lab[LyapunovParams, LyapunovState]):
                 V = run_to_completion(params.V.values(many))
                 body_V = float(V[0])
                 if runs is not None and due:
-                    runs = look(runs, U[1:], V[1:], self._outside(params, state.study, runs, V[1:]))
+                    runs = hold_controls(
+                        runs, U[1:], V[1:], self._outside(params, state.study, runs, V[1:])
+                    )
         if runs is not None:
-            runs = advance(runs, loop.system, substeps)
+            runs = advance_ensemble(runs, loop.system, substeps)
         x = np.clip(
-            loop.system.step(x, u, STEP), -2.0 * params.plane.upper, 2.0 * params.plane.upper
+            loop.system.step(x, u, SIMULATION_STEP),
+            -2.0 * params.plane.upper,
+            2.0 * params.plane.upper,
         )
         count = state.steps + 1
-        return replace(state, t=count * STEP, steps=count, x=x, u=u, runs=runs, body_V=body_V)
+        return replace(
+            state, t=count * SIMULATION_STEP, steps=count, x=x, u=u, runs=runs, body_V=body_V
+        )
 
     @staticmethod
     def _outside(
@@ -117,13 +129,17 @@ class Lyapunov(Lab[LyapunovParams, LyapunovState]):
         """Which of the runs (M,) are outside of the set."""
         if params.set == "box":
             return np.asarray(~params.box.contains(runs.X, 1e-9))
-        return np.asarray(found.level * (1.0 + OVER) < V) if found.level > 0.0 else np.inf < V
+        return (
+            np.asarray(found.level * (1.0 + LEVEL_TOLERANCE) < V)
+            if found.level > 0.0
+            else np.inf < V
+        )
 
     # The solver's clock -----------------------------------------------------------------------
 
     def solve(self, params: LyapunovParams, state: LyapunovState) -> Iterator[Snapshot | None]:
         """V, its change and its level sets over the plane, at once."""
-        found = yield from study(params)
+        found = yield from analyse(params)
         if isinstance(found, str):
             yield Snapshot(1, {"failure": found}, done=found)
             return
@@ -189,7 +205,7 @@ class Lyapunov(Lab[LyapunovParams, LyapunovState]):
         return dict(zip(("q_name", "v_name"), names, strict=True))
 
     def draw(self, scene: Scene, params: LyapunovParams, state: LyapunovState) -> None:
-        draw(scene, params, state.study, state.runs, state.x)
+        draw_phase_plane(scene, params, state.study, state.runs, state.x)
 
 
 def _summary(found: LyapunovAnalysis) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 from labs.appendix.lyapunov.candidates import CANDIDATES, Candidate, Ellipse, candidate
 from labs.appendix.lyapunov.closed_loop import (
     LOOPS,
-    WINDOWS,
+    STATE_WINDOWS,
     ClosedLoop,
     ClosedLoopSettings,
     closed_loop,
@@ -132,5 +132,5 @@ class LyapunovParams(Params):
 @cache
 def plane_of(system: str, lying: bool) -> PhasePlane:
     """The plane of a loop, with its window."""
-    window = np.array(WINDOWS[system])
+    window = np.array(STATE_WINDOWS[system])
     return PhasePlane.of(loop_system(system), -window, window, lying=lying)

@@ -5,19 +5,19 @@ from functools import lru_cache
 
 import numpy as np
 
+from labs.appendix.lyapunov.analysis import NODES, LyapunovAnalysis, interpolate_value
 from labs.appendix.lyapunov.contours import level_lines
 from labs.appendix.lyapunov.params import LyapunovParams
 from labs.appendix.lyapunov.plots import relative_change
-from labs.appendix.lyapunov.runs import StateEnsemble
-from labs.appendix.lyapunov.study import NODES, LyapunovAnalysis, interpolated
+from labs.appendix.lyapunov.state_ensemble import StateEnsemble
 from labs.colors import NO_VALUE, from_oklab, to_oklab
 from labs.scene import Color, Scene
 from labs.tasks.phase_plane.picture import LAYER, PhasePlane
 
-FALLS = ((0.82, 0.92, 0.90), (0.10, 0.45, 0.46))
-GROWS = ((0.98, 0.88, 0.76), (0.78, 0.34, 0.10))
+DECREASE_COLORS = ((0.82, 0.92, 0.90), (0.10, 0.45, 0.46))
+INCREASE_COLORS = ((0.98, 0.88, 0.76), (0.78, 0.34, 0.10))
 """sRGB, where V changes little and where by much: teal and amber."""
-STRONG = 0.3
+SATURATED_CHANGE = 0.3
 """Of V, a change that has the full colour."""
 LEVELS = (0.1, 0.3, 0.6)
 """Of V that are drawn, in parts of the largest inside the window."""
@@ -30,7 +30,7 @@ HEIGHT = 0.75
 """[m] of the bowl where V is endless."""
 
 
-def draw(
+def draw_phase_plane(
     scene: Scene,
     params: LyapunovParams,
     found: LyapunovAnalysis | None,
@@ -44,7 +44,7 @@ def draw(
     if found is None:
         plane.handle(scene, "state", x)
         return
-    picture = _bowl(found, plane)
+    picture = _value_surface(found, plane)
     scene.surface("V", picture.points, picture.colors)
     _draw_sets(scene, params, found, picture)
     if runs is not None:
@@ -52,7 +52,7 @@ def draw(
     scene.handle("state", picture.place(np.clip(x, plane.lower, plane.upper), 0.0), 0.045)
 
 
-class _Bowl:
+class _ValueSurface:
     """Where states are on the flat plate, or on V as a surface over it; and what of the picture
     stays while V does."""
 
@@ -75,7 +75,7 @@ class _Bowl:
         if not self.plane.lying:
             return self.plane.place(X, lift)
         flat = X.reshape(-1, 2)
-        heights = interpolated(self._grid, self._heights, flat).reshape(X.shape[:-1])
+        heights = interpolate_value(self._grid, self._heights, flat).reshape(X.shape[:-1])
         return self.plane.place(X, heights + 3.0 * lift)
 
     def lines(
@@ -87,12 +87,12 @@ class _Bowl:
 
 
 @lru_cache(maxsize=4)
-def _bowl(found: LyapunovAnalysis, plane: PhasePlane) -> _Bowl:
-    return _Bowl(plane, found)
+def _value_surface(found: LyapunovAnalysis, plane: PhasePlane) -> _ValueSurface:
+    return _ValueSurface(plane, found)
 
 
 def _draw_sets(
-    scene: Scene, params: LyapunovParams, found: LyapunovAnalysis, picture: _Bowl
+    scene: Scene, params: LyapunovParams, found: LyapunovAnalysis, picture: _ValueSurface
 ) -> None:
     """Level lines, the border of where V falls, the set that is asked about, and of a box the
     largest level set within."""
@@ -112,7 +112,7 @@ def _draw_sets(
             scene.handle(f"axis {i}", picture.place(end, 0.0), 0.03)
 
 
-def _draw_runs(scene: Scene, runs: StateEnsemble, picture: _Bowl) -> None:
+def _draw_runs(scene: Scene, runs: StateEnsemble, picture: _ValueSurface) -> None:
     """All states, those that have left the set in red, with the last steps of each."""
     plane = picture.plane
     inside = ((plane.lower <= runs.X) & (plane.upper >= runs.X)).all(axis=1)
@@ -133,9 +133,9 @@ def _draw_runs(scene: Scene, runs: StateEnsemble, picture: _Bowl) -> None:
 def change_colors(change: np.ndarray) -> np.ndarray:
     """(..., 3) sRGB of the relative change (...) of V in a step: teal where it falls, amber where
     it grows, the stronger the more; grey where V = 0."""
-    share = np.sqrt(np.minimum(np.abs(np.nan_to_num(change)) / STRONG, 1.0))[..., None]
+    share = np.sqrt(np.minimum(np.abs(np.nan_to_num(change)) / SATURATED_CHANGE, 1.0))[..., None]
     colors = np.empty((*change.shape, 3))
-    for ends, some in ((FALLS, change < 0.0), (GROWS, change >= 0.0)):
+    for ends, some in ((DECREASE_COLORS, change < 0.0), (INCREASE_COLORS, change >= 0.0)):
         pale, full = to_oklab(np.array(ends))
         colors[some] = from_oklab(pale + share[some] * (full - pale))
     colors[np.isnan(change)] = NO_VALUE

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from labs.appendix.lyapunov.analysis import NODES, LyapunovAnalysis
 from labs.appendix.lyapunov.params import LyapunovParams
-from labs.appendix.lyapunov.runs import STEPS, StateEnsemble
-from labs.appendix.lyapunov.study import NODES, LyapunovAnalysis
+from labs.appendix.lyapunov.state_ensemble import RUN_STEPS, StateEnsemble
 from labs.plots import Curves, HeatMap, Line, Note, Readout, TimeSeries, Trace
 
 PLOTS = (
@@ -50,11 +50,11 @@ PLOTS = (
     Readout("decreasing", "V decreases in", "%"),
     Readout("covered", "Largest set covers", "%"),
 )
-COARSE = 2
+MAP_STRIDE = 2
 """The map shows every second node."""
 LARGEST_CHANGE = 1.0
 """In parts of V; what is larger is shown as this."""
-TINY = 1e-12
+SMALLEST_RATIO = 1e-12
 
 
 def run_fields(
@@ -63,11 +63,11 @@ def run_fields(
     """The runs against what the constants promise."""
     none = np.empty(0)
     fields = dict.fromkeys(("k", "farthest", "median", "V_most", "V_median"), none)
-    fields |= _promised(found)
+    fields |= _bound_fields(found)
     if runs is None or found is None or runs.k < 0:
         return fields
     distances, V = (
-        np.maximum(some / np.where(some[0] == 0.0, 1.0, some[0]), TINY)
+        np.maximum(some / np.where(some[0] == 0.0, 1.0, some[0]), SMALLEST_RATIO)
         for some in (runs.distances, runs.V)
     )
     return fields | {
@@ -79,24 +79,24 @@ def run_fields(
     }
 
 
-def _promised(found: LyapunovAnalysis | None) -> dict[str, np.ndarray]:
+def _bound_fields(found: LyapunovAnalysis | None) -> dict[str, np.ndarray]:
     """Not known yet it is empty; where V is no Lyapunov function there is nothing."""
     if found is None:
         return dict.fromkeys(("k_bound", "bound", "V_bound"), np.empty(0))
-    constants, k = found.constants, np.arange(STEPS + 1.0)
+    constants, k = found.constants, np.arange(RUN_STEPS + 1.0)
     if not constants.holds:
         return {}
     rate = 1.0 - constants.alpha_3 / constants.alpha_2
-    return {"k_bound": k, "bound": constants.bound(STEPS), "V_bound": rate**k}
+    return {"k_bound": k, "bound": constants.bound(RUN_STEPS), "V_bound": rate**k}
 
 
 def map_fields(params: LyapunovParams, found: LyapunovAnalysis | None) -> Mapping[str, np.ndarray]:
     """The change of V over the window; empty where V = 0."""
     window = params.loop.window
-    axes = [np.linspace(-half, half, NODES)[::COARSE] for half in window]
+    axes = [np.linspace(-half, half, NODES)[::MAP_STRIDE] for half in window]
     change = np.full((len(axes[1]), len(axes[0])), np.nan)
     if found is not None:
-        change = relative_change(found)[::COARSE, ::COARSE]
+        change = relative_change(found)[::MAP_STRIDE, ::MAP_STRIDE]
     return {"map_q": axes[0], "map_v": axes[1], "map_change": change}
 
 
@@ -119,15 +119,15 @@ def conditions(params: LyapunovParams, found: LyapunovAnalysis | None, failure: 
         where = "in the level set" if found.level > 0.0 else "in the window"
     lines = [
         f"V ≥ α₁|x|² {where}: "
-        + (f"holds, α₁ = {a.alpha_1:.3g}." if a.alpha_1 > 0.0 else _fails(a.alpha_1)),
+        + (f"holds, α₁ = {a.alpha_1:.3g}." if a.alpha_1 > 0.0 else _failure_message(a.alpha_1)),
         f"V ≤ α₂|x|² {where}: holds, α₂ = {a.alpha_2:.3g}.",
         f"V(f(x)) − V(x) ≤ −α₃|x|² {where}: "
-        + (f"holds, α₃ = {a.alpha_3:.3g}." if a.alpha_3 > 0.0 else _fails(a.alpha_3)),
+        + (f"holds, α₃ = {a.alpha_3:.3g}." if a.alpha_3 > 0.0 else _failure_message(a.alpha_3)),
     ]
     if a.holds:
         lines.append(f"So |xₖ| ≤ c γᵏ |x₀| with c = {a.c:.3g}, γ = {a.gamma:.4f}.")
     return "\n".join(lines)
 
 
-def _fails(least: float) -> str:
+def _failure_message(least: float) -> str:
     return f"fails, the best number is {least:.3g}."

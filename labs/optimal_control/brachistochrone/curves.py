@@ -12,12 +12,12 @@ from labs.optimal_control.brachistochrone.cycloid import cycloid_points, fastest
 NODES = 1201
 
 
-def straight(across: float, depth: float) -> np.ndarray:
+def straight_line(across: float, depth: float) -> np.ndarray:
     """(2, 2)"""
     return np.array([[0.0, 0.0], [across, depth]])
 
 
-def with_knee(knee: np.ndarray, across: float, depth: float) -> np.ndarray:
+def knee_polyline(knee: np.ndarray, across: float, depth: float) -> np.ndarray:
     """(3, 2): straight to the knee (2,) and straight on."""
     return np.array([[0.0, 0.0], knee, [across, depth]])
 
@@ -47,15 +47,15 @@ def bezier(control: np.ndarray) -> np.ndarray:
 
 def cycloid_to_bottom(radius: float, theta: float) -> np.ndarray:
     """(NODES, 2) from its angle theta to the lowest point, at pi."""
-    return cycloid_points(radius, np.pi - (np.pi - theta) * _from_start())
+    return cycloid_points(radius, np.pi - (np.pi - theta) * _clustered_parameter())
 
 
 def circle_to_bottom(radius: float, theta: float) -> np.ndarray:
     """(NODES, 2) of a quadrant from its angle theta, in [0, pi/2], to the lowest point."""
-    angle = np.pi / 2 - (np.pi / 2 - theta) * _from_start()
+    angle = np.pi / 2 - (np.pi / 2 - theta) * _clustered_parameter()
     return np.asarray(radius * np.stack([1.0 - np.cos(angle), np.sin(angle)], axis=1))
 
 
-def _from_start() -> np.ndarray:
+def _clustered_parameter() -> np.ndarray:
     """(NODES,) from 1 to 0, slowly at first."""
     return 1.0 - np.linspace(0.0, 1.0, NODES) ** 2

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-FLAT = 1e-15
+NEGLIGIBLE_HEAD = 1e-15
 """v^2 / 2g [m] of what does not move."""
 
 
@@ -59,10 +59,10 @@ class Descent:
         since, duration = t - self.clock[i], self.clock[i + 1] - self.clock[i]
         done = np.divide(since, duration, out=np.ones(len(t)), where=duration > 0.0).clip(0.0, 1.0)
         v, w = self.speed[i], self.speed[i + 1]
-        now, mean = v + done * (w - v), np.maximum(v + w, FLAT)
+        now, mean = v + done * (w - v), np.maximum(v + w, NEGLIGIBLE_HEAD)
         part = (done * (v + now) / mean)[:, None]
         chord = self.points[i + 1] - self.points[i]
-        length = np.maximum(np.hypot(*chord.T), FLAT)[:, None]
+        length = np.maximum(np.hypot(*chord.T), NEGLIGIBLE_HEAD)[:, None]
         work = self.friction_work
         return BeadMotion(
             self.points[i] + part * chord,
@@ -76,11 +76,11 @@ def descend(points: np.ndarray, g: float, mu: float) -> Descent:
     """Down the polyline `points` (k, 2) [m] from rest at the first."""
     work = mu * np.concatenate([[0.0], np.cumsum(np.abs(np.diff(points[:, 0])))])
     head = points[:, 1] - points[0, 1] - work
-    stuck = np.flatnonzero(head[1:] < FLAT)
+    stuck = np.flatnonzero(head[1:] < NEGLIGIBLE_HEAD)
     if len(stuck):
         i = int(stuck[0]) + 1
         part = head[i - 1] / (head[i - 1] - head[i]) if i > 1 else 0.0
-        points, work, head = (_cut(rows, i, part) for rows in (points, work, head))
+        points, work, head = (_truncate(rows, i, part) for rows in (points, work, head))
     speed = np.sqrt(2.0 * g * np.maximum(head, 0.0))
     length, pace = np.hypot(*np.diff(points, axis=0).T), speed[:-1] + speed[1:]
     duration = np.divide(2.0 * length, pace, out=np.zeros(len(pace)), where=pace > 0.0)
@@ -88,6 +88,6 @@ def descend(points: np.ndarray, g: float, mu: float) -> Descent:
     return Descent(points, speed, clock, g * work, arrived=not len(stuck))
 
 
-def _cut(rows: np.ndarray, i: int, part: float) -> np.ndarray:
+def _truncate(rows: np.ndarray, i: int, part: float) -> np.ndarray:
     """Up to this part of the way from row i - 1 to row i."""
     return np.concatenate([rows[:i], [rows[i - 1] + part * (rows[i] - rows[i - 1])]])

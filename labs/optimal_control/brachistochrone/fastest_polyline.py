@@ -31,13 +31,13 @@ from labs.resumable import Resumable
 
 EXPONENTS = {"even": 1, "clustered": 3}
 """Of i / N, by the name of the grid."""
-MS = 1e3
+MILLISECONDS = 1e3
 """In a second: T is near 1000, and so are its gradients far from what rounds."""
-SLOWEST = 1e-6
+MIN_SPEED = 1e-6
 """[m/s] the least speed at a node."""
 
 
-def grid(across: float, segments: int, name: str) -> np.ndarray:
+def grid_abscissae(across: float, segments: int, name: str) -> np.ndarray:
     """Abscissae (segments + 1,) [m], from 0 to `across`; the name is one of EXPONENTS."""
     return np.asarray(across * np.linspace(0.0, 1.0, segments + 1) ** EXPONENTS[name])
 
@@ -58,7 +58,7 @@ class FastestPolyline:
 
     @cached_property
     def lower(self) -> np.ndarray:
-        return np.full(len(self.x) - 2, SLOWEST)
+        return np.full(len(self.x) - 2, MIN_SPEED)
 
     @cached_property
     def upper(self) -> np.ndarray:
@@ -80,13 +80,13 @@ class FastestPolyline:
         if not (np.isfinite(y).all() and (y > 0.0).all()):
             return ProgramValues(np.inf, none, none)
         p, q, _ = self._segments(y)
-        return ProgramValues(MS * float(np.hypot(p, q).sum()), none, none)
+        return ProgramValues(MILLISECONDS * float(np.hypot(p, q).sum()), none, none)
 
     def derivatives(self, y: np.ndarray) -> ProgramDerivatives:
         p, q, S = self._segments(y)
         t_v = _gradient(p, q, S, self.g, self.mu)[2]
         none = csc_array((0, len(y)))
-        return ProgramDerivatives(MS * (t_v[1:, 0] + t_v[:-1, 1]), none, none)
+        return ProgramDerivatives(MILLISECONDS * (t_v[1:, 0] + t_v[:-1, 1]), none, none)
 
     def hessian(
         self, y: np.ndarray, lam: np.ndarray, mu: np.ndarray, exact: bool
@@ -98,7 +98,7 @@ class FastestPolyline:
         p_v, q_v, t_v = (a[:, :, None] for a in _gradient(p, q, S, self.g, self.mu))
         bent = p + self.mu * q if exact else np.maximum(p + self.mu * q, 0.0)
         outer = p_v * p_v.swapaxes(1, 2) + q_v * q_v.swapaxes(1, 2) - t_v * t_v.swapaxes(1, 2)
-        second = MS * (outer + (2.0 * bent * p / S**2)[:, None, None]) / t[:, None, None]
+        second = MILLISECONDS * (outer + (2.0 * bent * p / S**2)[:, None, None]) / t[:, None, None]
         diagonal = second[1:, 0, 0] + second[:-1, 1, 1]
         beside = second[1:-1, 0, 1]
         return csc_array(diags_array([beside, diagonal, beside], offsets=[-1, 0, 1]))

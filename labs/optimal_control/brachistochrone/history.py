@@ -31,8 +31,8 @@ class DescentHistory:
     def start(cls, nodes: np.ndarray, cost: float, grids: list[int]) -> Self:
         """Of a first guess; infinite is the cost of one that does not arrive."""
         segments, none = np.array(grids, dtype=float), np.zeros(0)
-        nodes = _filled(nodes, grids[-1] + 1)
-        curves = np.tile(_thin(nodes), (KEPT_CURVES, 1, 1))
+        nodes = _pad_nodes(nodes, grids[-1] + 1)
+        curves = np.tile(_resample_nodes(nodes), (KEPT_CURVES, 1, 1))
         costs = np.array([cost]) if np.isfinite(cost) else none
         return cls(nodes, costs, none, curves, segments, np.zeros(len(grids)))
 
@@ -40,10 +40,10 @@ class DescentHistory:
         """One iteration later."""
         return replace(
             self,
-            nodes=_filled(nodes, len(self.nodes)),
+            nodes=_pad_nodes(nodes, len(self.nodes)),
             cost=np.append(self.cost, cost),
             gradient=np.append(self.gradient, gradient),
-            curves=np.concatenate([self.curves[1:], _thin(nodes)[None]]),
+            curves=np.concatenate([self.curves[1:], _resample_nodes(nodes)[None]]),
         )
 
     def finish_grid(self) -> Self:
@@ -53,12 +53,12 @@ class DescentHistory:
         return replace(self, solved=solved)
 
 
-def _filled(nodes: np.ndarray, count: int) -> np.ndarray:
+def _pad_nodes(nodes: np.ndarray, count: int) -> np.ndarray:
     """(count, 2): the last one repeated."""
     return np.concatenate([nodes, np.repeat(nodes[-1:], count - len(nodes), axis=0)])
 
 
-def _thin(nodes: np.ndarray) -> np.ndarray:
+def _resample_nodes(nodes: np.ndarray) -> np.ndarray:
     """(CURVE_POINTS, 2) on the polyline, evenly along it."""
     length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(nodes, axis=0).T))])
     along = np.linspace(0.0, length[-1], CURVE_POINTS)

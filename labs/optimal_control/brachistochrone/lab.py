@@ -9,8 +9,8 @@ import numpy as np
 from labs.algorithms import sqp
 from labs.algorithms.sqp import SqpOptions
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
-from labs.optimal_control.brachistochrone.curves import straight
-from labs.optimal_control.brachistochrone.fastest_polyline import FastestPolyline, grid
+from labs.optimal_control.brachistochrone.curves import straight_line
+from labs.optimal_control.brachistochrone.fastest_polyline import FastestPolyline, grid_abscissae
 from labs.optimal_control.brachistochrone.history import DescentHistory
 from labs.optimal_control.brachistochrone.params import BrachistochroneParams
 from labs.optimal_control.brachistochrone.picture import draw_handles, draw_optimiser, draw_race
@@ -21,14 +21,19 @@ from labs.optimal_control.brachistochrone.plots import (
     optimiser_fields,
     race_fields,
 )
-from labs.optimal_control.brachistochrone.race import CURVES, BeadRace, nearest_part, race_of
+from labs.optimal_control.brachistochrone.race import (
+    CURVE_NAMES,
+    BeadRace,
+    nearest_release,
+    simulate_race,
+)
 from labs.params import Value
 from labs.scene import Scene
 
 OPTIONS = SqpOptions(hessian="gauss-newton", tolerance=1e-7, iterations=100)
 """On each grid. This Hessian is the exact one wherever T is convex (`fastest_polyline`); the
 tolerance is of the gradient, in parts of the straight line's."""
-REST = 1.5
+REST_DURATION = 1.5
 """[s] between the arrival of the last bead and the next race."""
 
 
@@ -39,7 +44,7 @@ class BrachistochroneState(State):
     history: DescentHistory
     steps: int = 0
     """World steps done: t = steps * period."""
-    since: int = 0
+    race_steps: int = 0
     """Of them, since the beads were let go."""
 
 
@@ -72,7 +77,9 @@ class Brachistochrone(Lab[BrachistochroneParams, BrachistochroneState]):
     def init(self, params: BrachistochroneParams, rng: np.random.Generator) -> BrachistochroneState:
         """The beads are let go; the optimiser has a straight line."""
         problem = _problem(params, params.grids[0])
-        return BrachistochroneState(history=_first_guess(params, problem, _straight(problem)))
+        return BrachistochroneState(
+            history=_initial_history(params, problem, _straight_line_speeds(problem))
+        )
 
     # The solver's clock -----------------------------------------------------------------------
 
@@ -82,18 +89,22 @@ class Brachistochrone(Lab[BrachistochroneParams, BrachistochroneState]):
         """One iteration a snapshot, on one grid or on several in turn."""
         problem, count = _problem(params, params.grids[0]), 0
         cold = params.start == "cold"
-        v = _straight(problem) if cold else _along(problem, state.history.nodes)
-        history = _first_guess(params, problem, v)
+        v = _straight_line_speeds(problem) if cold else _speeds_along(problem, state.history.nodes)
+        history = _initial_history(params, problem, v)
         if not params.in_reach:
-            yield Snapshot(1, {"history": history}, _out_of_reach(params))
+            yield Snapshot(1, {"history": history}, _out_of_reach_message(params))
             return
         for segments in params.grids:
             problem = _problem(params, segments)
-            at = _start(problem, v if not count else _along(problem, history.nodes))
+            at = _initial_iterate(
+                problem, v if not count else _speeds_along(problem, history.nodes)
+            )
             while not at.stopped:
-                at = yield from sqp.step_in_pieces(problem, OPTIONS, at)
+                at = yield from sqp.resumable_step(problem, OPTIONS, at)
                 count += 1
-                history = history.append(problem.nodes(at.y), at.values.f, _gradient(problem, at))
+                history = history.append(
+                    problem.nodes(at.y), at.values.f, _free_gradient_norm(problem, at)
+                )
                 if at.converged:
                     history = history.finish_grid()
                 more = at.converged and segments != params.grids[-1]
@@ -113,7 +124,7 @@ class Brachistochrone(Lab[BrachistochroneParams, BrachistochroneState]):
         _, x, z = point
         across, depth = x - params.x_a, params.z_a - z
         if handle == "release":
-            return {"release": params.nearest("release", nearest_part(params, across, depth))}
+            return {"release": params.nearest("release", nearest_release(params, across, depth))}
         dragged = {
             "A": {"x_a": x, "z_a": z},
             "B": {"x_b": x, "z_b": z},
@@ -128,17 +139,20 @@ class Brachistochrone(Lab[BrachistochroneParams, BrachistochroneState]):
         self, params: BrachistochroneParams, inputs: Inputs, state: BrachistochroneState
     ) -> BrachistochroneState:
         """5 ms of the race; when all have arrived a rest, and then the next."""
-        steps, since = state.steps + 1, state.since + 1
-        if since * self.period > race_of(params, state.history.nodes).duration + REST:
+        steps, since = state.steps + 1, state.race_steps + 1
+        if (
+            since * self.period
+            > simulate_race(params, state.history.nodes).duration + REST_DURATION
+        ):
             since = 0
-        return replace(state, t=steps * self.period, steps=steps, since=since)
+        return replace(state, t=steps * self.period, steps=steps, race_steps=since)
 
     # What is shown ----------------------------------------------------------------------------
 
     def measure(self, params: BrachistochroneParams, state: BrachistochroneState) -> Measurement:
         """Of each bead its motion and energies per kg; and by how much each curve is slower than
         the fastest there is. What does not arrive has no time."""
-        race, t = self._race(params, state)
+        race, t = self._race_and_time(params, state)
         now = race.at(t)
         height = np.round(race.end[1] - now.point[:, 1], 9) + 0.0  # 0 at the end, not what rounds
         measured: dict[str, float | np.ndarray] = {
@@ -153,13 +167,15 @@ class Brachistochrone(Lab[BrachistochroneParams, BrachistochroneState]):
             measured["fastest"] = race.fastest.time
         arrived = race.times[np.isfinite(race.times)]
         if params.race == "starts":
-            measured["isochrone"] = float(np.pi * np.sqrt(params.wheel.radius / params.g))
+            measured["isochrone"] = float(
+                np.pi * np.sqrt(params.generating_circle.radius / params.g)
+            )
             if len(arrived):
                 measured["spread"] = round(1e3 * float(np.ptp(arrived)), 3)
         elif race.fastest:
             measured |= {
-                f"behind_{name}": 1e3 * float(time - race.shortest)
-                for name, time in zip(CURVES, race.times, strict=True)
+                f"behind_{name}": 1e3 * float(time - race.shortest_time)
+                for name, time in zip(CURVE_NAMES, race.times, strict=True)
                 if np.isfinite(time)
             }
         return measured
@@ -167,13 +183,13 @@ class Brachistochrone(Lab[BrachistochroneParams, BrachistochroneState]):
     def fields(
         self, params: BrachistochroneParams, state: BrachistochroneState
     ) -> Mapping[str, np.ndarray]:
-        race, _ = self._race(params, state)
+        race, _ = self._race_and_time(params, state)
         return race_fields(params, race) | optimiser_fields(race, state.history)
 
     def notes(
         self, params: BrachistochroneParams, state: BrachistochroneState
     ) -> Mapping[str, str]:
-        return {"finish": finish_note(params, *self._race(params, state))}
+        return {"finish": finish_note(params, *self._race_and_time(params, state))}
 
     def labels(self, params: BrachistochroneParams) -> Mapping[str, tuple[str, ...]]:
         return bead_names(params)
@@ -181,7 +197,7 @@ class Brachistochrone(Lab[BrachistochroneParams, BrachistochroneState]):
     def draw(
         self, scene: Scene, params: BrachistochroneParams, state: BrachistochroneState
     ) -> None:
-        race, t = self._race(params, state)
+        race, t = self._race_and_time(params, state)
         draw_handles(scene, params, race)
         draw_race(scene, params, race, race.at(t).point, t)
         draw_optimiser(scene, params, state.history)
@@ -191,19 +207,19 @@ class Brachistochrone(Lab[BrachistochroneParams, BrachistochroneState]):
         """The solver."""
         sqp.prepare()
 
-    def _race(
+    def _race_and_time(
         self, params: BrachistochroneParams, state: BrachistochroneState
     ) -> tuple[BeadRace, float]:
         """The race, and its time [s]."""
-        return race_of(params, state.history.nodes), state.since * self.period
+        return simulate_race(params, state.history.nodes), state.race_steps * self.period
 
 
-def _gradient(problem: FastestPolyline, at: sqp.SqpIterate) -> float:
+def _free_gradient_norm(problem: FastestPolyline, at: sqp.SqpIterate) -> float:
     """max |dT/dv| [ms/(m/s)], without what pushes against a bound."""
     return float(np.abs(problem.derivatives(at.y).f_y + at.nu).max())
 
 
-def _out_of_reach(params: BrachistochroneParams) -> str:
+def _out_of_reach_message(params: BrachistochroneParams) -> str:
     return (
         f"No curve arrives: up to B friction takes the height of {params.mu * params.across:.2f} m "
         f"and more, and B lies {params.depth:.2f} m down. Lower μ, or move B."
@@ -211,35 +227,37 @@ def _out_of_reach(params: BrachistochroneParams) -> str:
 
 
 def _problem(params: BrachistochroneParams, segments: int) -> FastestPolyline:
-    x = grid(params.across, segments, params.grid)
+    x = grid_abscissae(params.across, segments, params.grid)
     floor = max(params.floor, params.depth)
     return FastestPolyline(x, params.depth, params.g, params.mu, floor)
 
 
-def _first_guess(
+def _initial_history(
     params: BrachistochroneParams, problem: FastestPolyline, v: np.ndarray
 ) -> DescentHistory:
     """These speeds; where B is out of reach, a straight line without a time."""
     if not params.in_reach:
-        return DescentHistory.start(straight(params.across, params.depth), np.inf, params.grids)
+        return DescentHistory.start(
+            straight_line(params.across, params.depth), np.inf, params.grids
+        )
     return DescentHistory.start(problem.nodes(v), problem.values(v).f, params.grids)
 
 
-def _start(problem: FastestPolyline, v: np.ndarray) -> sqp.SqpIterate:
+def _initial_iterate(problem: FastestPolyline, v: np.ndarray) -> sqp.SqpIterate:
     """At these speeds. A gradient is small beside the straight line's, wherever one starts."""
-    scale = float(np.abs(problem.derivatives(_straight(problem)).f_y).max())
+    scale = float(np.abs(problem.derivatives(_straight_line_speeds(problem)).f_y).max())
     return replace(sqp.init(problem, v, OPTIONS), largest_gradient=scale)
 
 
-def _straight(problem: FastestPolyline) -> np.ndarray:
+def _straight_line_speeds(problem: FastestPolyline) -> np.ndarray:
     """Speeds down the straight line to B."""
     return problem.speeds(problem.depth * problem.x[1:-1] / problem.x[-1])
 
 
-def _along(problem: FastestPolyline, nodes: np.ndarray) -> np.ndarray:
+def _speeds_along(problem: FastestPolyline, nodes: np.ndarray) -> np.ndarray:
     """Speeds down the curve through `nodes`, stretched to the problem's ends; down the straight
     line where a bead is there sooner."""
-    straight = _straight(problem)
+    straight = _straight_line_speeds(problem)
     scale = np.array([problem.x[-1], problem.depth]) / nodes[-1]
     v = problem.speeds(np.interp(problem.x[1:-1], *(scale * nodes).T))
     return v if problem.values(v).f < problem.values(straight).f else straight

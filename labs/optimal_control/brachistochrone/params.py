@@ -110,7 +110,7 @@ class BrachistochroneParams(Params):
         return self.depth > self.mu * self.across
 
     @property
-    def wheel(self) -> FastestDescent:
+    def generating_circle(self) -> FastestDescent:
         """What rolls the cycloid from A to B, whatever the friction."""
         return fastest_descent(self.across, self.depth, self.g)
 

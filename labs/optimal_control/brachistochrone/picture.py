@@ -10,7 +10,7 @@ from labs.colors import sequential
 from labs.optimal_control.brachistochrone.curves import cycloid
 from labs.optimal_control.brachistochrone.history import KEPT_CURVES, DescentHistory
 from labs.optimal_control.brachistochrone.params import NO_FLOOR, BrachistochroneParams
-from labs.optimal_control.brachistochrone.race import BEADS, CURVES, YOURS, BeadRace
+from labs.optimal_control.brachistochrone.race import BEAD_COUNT, CURVE_NAMES, YOURS, BeadRace
 from labs.scene import Scene
 from labs.shapes import Sphere, Vector3, Visual, primitive, translation
 
@@ -71,10 +71,10 @@ def draw_race(
     scene.surface("curves", points, colors)
     places = params.world_points(beads)[:, 1:]
     scene.arm("beads", _beads(), places.ravel())
-    for i, name in enumerate(CURVES):
+    for i, name in enumerate(CURVE_NAMES):
         text = name if params.race == "curves" else ""
         if race.times[i] <= t:
-            place = f"{race.place(i)}. " if text else ""
+            place = f"{race.rank(i)}. " if text else ""
             text = f"{place}{text} {race.times[i]:.3f} s".strip()
         elif not race.descents[i].arrived and race.descents[i].clock[-1] <= t:
             text = f"{text}: stuck" if text else "stuck"
@@ -120,7 +120,7 @@ def _label_place(params: BrachistochroneParams, race: BeadRace, i: int) -> np.nd
     point = race.starts[i]
     if params.race == "curves":
         path = race.paths[i]
-        along = _along(path)
+        along = _arc_lengths(path)
         at = LABEL_PLACES[i] * along[-1]
         point = np.array([np.interp(at, along, axis) for axis in path.T])
     place: np.ndarray = params.world_points(point)[0]
@@ -147,20 +147,20 @@ def _ribbon(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Both sides (2, k, 3) of the i-th, and (k,) [m/s] how fast a bead is. Every other one runs
     backwards."""
-    along = _along(path)
+    along = _arc_lengths(path)
     nodes = along[:: max(1, len(along) // RIBBON_NODES)]
     at = np.union1d(nodes, np.linspace(0.0, along[-1], RIBBON_POINTS))
     points = np.stack([np.interp(at, along, axis) for axis in path.T], axis=1)
     tangent = np.gradient(points, axis=0)
     tangent /= np.maximum(np.hypot(*tangent.T), 1e-9)[:, None]
     normal = HALF_WIDTH * tangent[:, ::-1] * np.array([-1.0, 1.0])
-    layer = (i - BEADS) * LAYER * 0.25
+    layer = (i - BEAD_COUNT) * LAYER * 0.25
     sides = np.stack([params.world_points(points + s * normal, layer) for s in (1.0, -1.0)])
     work = params.mu * np.concatenate([[0.0], np.cumsum(np.abs(np.diff(points[:, 0])))])
     speed = np.sqrt(2.0 * params.g * np.maximum(points[:, 1] - work, 0.0))
     return (sides[:, ::-1], speed[::-1]) if i % 2 else (sides, speed)
 
 
-def _along(path: np.ndarray) -> np.ndarray:
+def _arc_lengths(path: np.ndarray) -> np.ndarray:
     """(k,) [m] length of the polyline up to each node."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])

@@ -6,7 +6,7 @@ import numpy as np
 
 from labs.optimal_control.brachistochrone.history import DescentHistory
 from labs.optimal_control.brachistochrone.params import BrachistochroneParams
-from labs.optimal_control.brachistochrone.race import BEADS, CURVES, STARTS, BeadRace
+from labs.optimal_control.brachistochrone.race import BEAD_COUNT, CURVE_NAMES, START_NAMES, BeadRace
 from labs.plots import Bars, Curves, Line, Note, Plot, Readout, TimeSeries, Trace
 
 OF_CURVES, OF_STARTS = {"race": ("curves",)}, {"race": ("starts",)}
@@ -71,7 +71,7 @@ PLOTS: tuple[Plot, ...] = (
     Readout("fastest", "Fastest possible", "s"),
     *(
         Readout(f"behind_{name}", f"{TITLES[name]}, behind", "ms", when=OF_CURVES)
-        for name in CURVES
+        for name in CURVE_NAMES
     ),
     Readout("spread", "First to last", "ms", when=OF_STARTS),
     Readout("isochrone", "From anywhere: π√(r/g)", "s", when=OF_STARTS),
@@ -81,11 +81,11 @@ PLOTS: tuple[Plot, ...] = (
 
 def race_fields(params: BrachistochroneParams, race: BeadRace) -> dict[str, np.ndarray]:
     """How far behind each is, and what is plotted along the ways."""
-    behind = np.full(BEADS, np.nan)
-    if np.isfinite(race.shortest):
-        behind[race.order] = race.times[race.order] - race.shortest
-    points = np.stack([motion.point for motion in race.sampled], axis=1)
-    speed = np.stack([motion.speed for motion in race.sampled], axis=1)
+    behind = np.full(BEAD_COUNT, np.nan)
+    if np.isfinite(race.shortest_time):
+        behind[race.finishing_order] = race.times[race.finishing_order] - race.shortest_time
+    points = np.stack([motion.point for motion in race.sampled_motions], axis=1)
+    speed = np.stack([motion.speed for motion in race.sampled_motions], axis=1)
     return {
         "behind": np.round(1e3 * behind, 3),
         "way_x": points[..., 0],
@@ -99,9 +99,11 @@ def _snell_fields(
     """sin(alpha) / v, alpha being the angle to the plumb line (with friction, to the gravity that
     counts), in parts of the value that the fastest curve keeps all the way."""
     if race.fastest is None:
-        return {"snell_x": np.zeros((0, BEADS)), "snell": np.zeros((0, BEADS))}
+        return {"snell_x": np.zeros((0, BEAD_COUNT)), "snell": np.zeros((0, BEAD_COUNT))}
     stretch = np.hypot(1.0, params.mu)
-    across, down = np.stack([motion.direction for motion in race.sampled], axis=2).swapaxes(0, 1)
+    across, down = np.stack([motion.direction for motion in race.sampled_motions], axis=2).swapaxes(
+        0, 1
+    )
     sine = np.abs(across + params.mu * down) / stretch
     constant = 0.5 / np.sqrt(params.g * stretch * race.fastest.radius)
     law = sine / np.maximum(speed, 1e-9) / constant
@@ -128,12 +130,12 @@ def optimiser_fields(race: BeadRace, history: DescentHistory) -> dict[str, np.nd
 
 def finish_note(params: BrachistochroneParams, race: BeadRace, t: float) -> str:
     """Who has arrived t seconds after the start, in order, and who never will."""
-    names = [TITLES[name] for name in CURVES]
+    names = [TITLES[name] for name in CURVE_NAMES]
     if params.race == "starts":
-        names = [f"Start {name}" for name in STARTS]
+        names = [f"Start {name}" for name in START_NAMES]
     lines = [
-        f"{race.place(i)}. {names[i]}: {race.times[i]:.4f} s."
-        for i in race.order
+        f"{race.rank(i)}. {names[i]}: {race.times[i]:.4f} s."
+        for i in race.finishing_order
         if race.times[i] <= t
     ]
     for name, descent in zip(names, race.descents, strict=True):
@@ -150,4 +152,4 @@ def finish_note(params: BrachistochroneParams, race: BeadRace, t: float) -> str:
 
 def bead_names(params: BrachistochroneParams) -> Mapping[str, tuple[str, ...]]:
     """What the components of vectors are."""
-    return {"bead": CURVES if params.race == "curves" else STARTS}
+    return {"bead": CURVE_NAMES if params.race == "curves" else START_NAMES}

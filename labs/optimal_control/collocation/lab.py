@@ -9,7 +9,7 @@ import numpy as np
 
 from labs.algorithms import riccati, sqp
 from labs.algorithms.collocation import Collocation
-from labs.algorithms.sqp import SqpIterate, Variables
+from labs.algorithms.sqp import PrimalDualPoint, SqpIterate
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot
 from labs.optimal_control.collocation.params import CollocationParams
 from labs.optimal_control.collocation.plots import (
@@ -20,35 +20,35 @@ from labs.optimal_control.collocation.plots import (
     structure_fields,
     study_fields,
 )
-from labs.optimal_control.collocation.structure import SparsityPattern, structure_of
+from labs.optimal_control.collocation.structure import SparsityPattern, sparsity_pattern
 from labs.optimal_control.collocation.studies import (
     NO_STUDY,
     ConvergenceStudy,
+    study_linear_solves,
     study_order,
-    study_sizes,
 )
 from labs.optimal_control.collocation.transcription import Costates, costates
 from labs.params import Value
 from labs.resumable import Resumable, run_to_completion
 from labs.scene import Scene
-from labs.tasks.direct.guesses import first_guess, start_guess, warm
+from labs.tasks.direct.guesses import first_guess, is_warm_start, start_guess
 from labs.tasks.direct.history import IterationHistory
-from labs.tasks.direct.motions import collocated_motion
+from labs.tasks.direct.motions import collocation_motion
 from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots
 from labs.tasks.direct.plan_params import CHOICE_SETTINGS
 from labs.tasks.direct.player import (
     DirectState,
-    advanced,
-    dragged,
-    labels_of,
-    measured,
-    replayed,
+    advance_player,
+    edit_balls,
+    measure_player,
+    plan_labels,
+    play_motion,
 )
-from labs.tasks.direct.tracking import playable
+from labs.tasks.direct.tracking import nominal_trajectory
 from labs.tasks.motion.playback import start_playback
-from labs.tasks.motion.player import PERIOD
+from labs.tasks.motion.player import WORLD_PERIOD
 
-OWN = ("reusable", "variables", "structure", "costates", "study")
+SNAPSHOT_FIELDS = ("reusable", "variables", "structure", "costates", "study")
 """Of the state, beside what is played."""
 
 
@@ -56,7 +56,7 @@ OWN = ("reusable", "variables", "structure", "costates", "study")
 class CollocationState(DirectState):
     """The motion with what its programme looks like."""
 
-    variables: Variables
+    variables: PrimalDualPoint
     structure: SparsityPattern
     costates: Costates
     study: ConvergenceStudy = NO_STUDY
@@ -72,7 +72,7 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
         "that are nearly empty, and see what a finer grid or a better rule buys."
     )
     Params = CollocationParams
-    period = PERIOD
+    period = WORLD_PERIOD
     plots = PLOTS
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Mass, least time": {"system": "mass", "objective": "least-time", "limit": 1.0},
@@ -92,17 +92,17 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
         """The first guess is the first motion, with its gaps."""
         program = params.program
         at = sqp.init(program, program.variables(*first_guess(params, params.N)), params.options)
-        motion = collocated_motion(program, at)
-        plan = playable(params, motion)
+        motion = collocation_motion(program, at)
+        plan = nominal_trajectory(params, motion)
         at = replace(at, derivatives=program.derivatives(at.y))
         return CollocationState(
             motion=motion,
             plan=plan,
             history=IterationHistory.start(params, at, motion),
             playback=start_playback(plan),
-            missed=np.zeros(0),
-            variables=Variables(at.y, at.lam, at.mu, at.nu),
-            structure=run_to_completion(_structure(program, at)),
+            goal_errors=np.zeros(0),
+            variables=PrimalDualPoint(at.y, at.lam, at.mu, at.nu),
+            structure=run_to_completion(_sparsity_pattern(program, at)),
             costates=costates(program, at),
         )
 
@@ -113,31 +113,31 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
     ) -> Iterator[Snapshot | None]:
         """One iteration a snapshot, and what is measured besides with the last."""
         program, seconds = params.program, dict[str, Any]()
-        at = _start(params, program, state)
+        at = _initial_iterate(params, program, state)
         if at.stopped:
             kept = replace(state, failed=True, reusable=False)
-            yield Snapshot(1, _kept(kept, seconds), at.stopped)
+            yield Snapshot(1, _snapshot_data(kept, seconds), at.stopped)
             return
-        history = IterationHistory.start(params, at, collocated_motion(program, at))
+        history = IterationHistory.start(params, at, collocation_motion(program, at))
         structure = state.structure if state.structure.variables == program.n else None
         while not at.stopped:
-            at = yield from sqp.step_in_pieces(program, params.options, at)
+            at = yield from sqp.resumable_step(program, params.options, at)
             yield None
-            motion = collocated_motion(program, at)
+            motion = collocation_motion(program, at)
             history = history.append(params, at, motion)
             yield None
             if at.derivatives is None:
                 at = replace(at, derivatives=program.derivatives(at.y))
             if structure is None or at.stopped:
-                structure = yield from _structure(program, at)
+                structure = yield from _sparsity_pattern(program, at)
             after = replace(
                 state,
                 motion=motion,
-                plan=playable(params, motion),
+                plan=nominal_trajectory(params, motion),
                 history=history,
                 failed=bool(at.stopped) and not at.converged,
                 reusable=at.reusable,
-                variables=Variables(at.y, at.lam, at.mu, at.nu),
+                variables=PrimalDualPoint(at.y, at.lam, at.mu, at.nu),
                 structure=structure,
                 costates=costates(program, at),
                 study=NO_STUDY,
@@ -145,8 +145,8 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
             if at.converged and params.study == "order":
                 after.study = yield from study_order(params, motion)
             if at.converged and params.study == "sizes":
-                after.study = yield from study_sizes(params, motion, seconds)
-            yield Snapshot(max(at.iteration, 1), _kept(after, seconds), at.stopped)
+                after.study = yield from study_linear_solves(params, motion, seconds)
+            yield Snapshot(max(at.iteration, 1), _snapshot_data(after, seconds), at.stopped)
 
     def accept(
         self, params: CollocationParams, state: CollocationState, snapshot: Snapshot
@@ -154,10 +154,10 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
         """Whatever is taken in is played from its start."""
         data = snapshot.data
         names = ("motion", "plan", "history", "failed")
-        state = replayed(state, *(data[name] for name in names))
+        state = play_motion(state, *(data[name] for name in names))
         return replace(
             state,
-            **{name: data[name] for name in OWN},
+            **{name: data[name] for name in SNAPSHOT_FIELDS},
             seconds=data.get("seconds", {}),
         )
 
@@ -165,7 +165,7 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
         self, params: CollocationParams, handle: str, point: tuple[float, float, float]
     ) -> Mapping[str, Value]:
         """The balls are the UR5's target and its obstacle."""
-        return dragged(params, handle, point)
+        return edit_balls(params, handle, point)
 
     # The world's clock ------------------------------------------------------------------------
 
@@ -173,14 +173,14 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
         self, params: CollocationParams, inputs: Inputs, state: CollocationState
     ) -> CollocationState:
         """10 ms of both runs; at the end of the motion a rest, and then from the start."""
-        return advanced(params, state)
+        return advance_player(params, state)
 
     # What is shown ----------------------------------------------------------------------------
 
     def measure(self, params: CollocationParams, state: CollocationState) -> Measurement:
         """The runs, the iterations, and the size of the programme."""
         structure, study = state.structure, state.study
-        found = measured(params, state) | {
+        found = measure_player(params, state) | {
             "variables": float(structure.variables),
             "constraints": float(structure.constraints),
             "nonzeros": float(structure.nonzeros),
@@ -204,7 +204,7 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
         )
 
     def labels(self, params: CollocationParams) -> Mapping[str, str | tuple[str, ...]]:
-        return labels_of(params)
+        return plan_labels(params)
 
     def draw(self, scene: Scene, params: CollocationParams, state: CollocationState) -> None:
         """The robot, its open-loop ghost, and the pieces of the path."""
@@ -219,21 +219,23 @@ class CollocationLab(Lab[CollocationParams, CollocationState]):
         riccati.prepare()
 
 
-def _start(params: CollocationParams, program: Collocation, state: CollocationState) -> SqpIterate:
+def _initial_iterate(
+    params: CollocationParams, program: Collocation, state: CollocationState
+) -> SqpIterate:
     """From the present solution, if there is one and it is wanted, with its multipliers if the grid
     is the same."""
-    if warm(params, state.reusable) and len(state.variables.y) == program.n:
-        return sqp.restart(program, state.variables, params.options)
+    if is_warm_start(params, state.reusable) and len(state.variables.y) == program.n:
+        return sqp.warm_start(program, state.variables, params.options)
     guess = start_guess(params, state.motion, state.reusable, params.N)
     return sqp.init(program, program.variables(*guess), params.options)
 
 
-def _structure(program: Collocation, at: SqpIterate) -> Resumable[SparsityPattern]:
+def _sparsity_pattern(program: Collocation, at: SqpIterate) -> Resumable[SparsityPattern]:
     assert at.derivatives
     L_yy = yield from program.hessian(at.y, at.lam, at.mu, exact=True)
-    return structure_of(at.derivatives.c_y, L_yy)
+    return sparsity_pattern(at.derivatives.c_y, L_yy)
 
 
-def _kept(state: CollocationState, seconds: Mapping[str, Any]) -> dict[str, Any]:
-    names = ("motion", "plan", "history", "failed", *OWN)
+def _snapshot_data(state: CollocationState, seconds: Mapping[str, Any]) -> dict[str, Any]:
+    names = ("motion", "plan", "history", "failed", *SNAPSHOT_FIELDS)
     return {name: getattr(state, name) for name in names} | {"seconds": seconds}

@@ -5,7 +5,7 @@ from labs.algorithms.collocation_schemes import SCHEMES
 from labs.params import Group
 from labs.tasks.direct.params import DirectParams
 
-MOST_STEPS = 60
+MAX_STEPS = 60
 
 TRANSCRIPTION = Group("Collocation", effect="solve")
 
@@ -13,7 +13,7 @@ TRANSCRIPTION = Group("Collocation", effect="solve")
 class CollocationParams(DirectParams):
     """What the user can turn."""
 
-    steps: float = TRANSCRIPTION.knob(30.0, 4.0, MOST_STEPS, "N", "", "Steps", step=1.0, key=True)
+    steps: float = TRANSCRIPTION.knob(30.0, 4.0, MAX_STEPS, "N", "", "Steps", step=1.0, key=True)
     """Of the grid: as many pieces of the motion, and of defects."""
     scheme: str = TRANSCRIPTION.choice(
         "midpoint", {name: scheme.title for name, scheme in SCHEMES.items()}, "Rule", key=True

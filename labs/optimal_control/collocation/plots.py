@@ -5,16 +5,16 @@ from collections.abc import Mapping
 import numpy as np
 
 from labs.algorithms.collocation_schemes import SCHEMES
-from labs.optimal_control.collocation.structure import SparsityPattern, edges, logarithms
+from labs.optimal_control.collocation.structure import SparsityPattern, cell_starts, log_magnitudes
 from labs.optimal_control.collocation.studies import ConvergenceStudy, slopes
 from labs.optimal_control.collocation.transcription import Costates
 from labs.plots import Curves, HeatMap, Line, Plot, Readout, TimeSeries, Trace
 from labs.tasks.direct.history import IterationHistory
 from labs.tasks.direct.player import DirectState
-from labs.tasks.direct.plots import control_played, position_played
+from labs.tasks.direct.plots import control_plot, position_plot
 from labs.tasks.motion.playback import FEEDBACK, OPEN_LOOP
 
-ORDER, SIZES = {"study": ("order",)}, {"study": ("sizes",)}
+WITH_ORDER_STUDY, WITH_SIZE_STUDY = {"study": ("order",)}, {"study": ("sizes",)}
 EARLIER = (4, 2, 1)
 """Iterations ago whose gaps are shown, too."""
 LINEAR_SOLVES = ("full matrix", "sparse matrix")
@@ -84,7 +84,7 @@ PLOTS: tuple[Plot, ...] = (
         ),
         log_x=True,
         log_y=True,
-        when=ORDER,
+        when=WITH_ORDER_STUDY,
     ),
     Curves(
         "Time of a Newton step",
@@ -93,7 +93,7 @@ PLOTS: tuple[Plot, ...] = (
         Trace("sizes", "solve_times", LINEAR_SOLVES, "marked", 1, note="time_slopes"),
         log_x=True,
         log_y=True,
-        when=SIZES,
+        when=WITH_SIZE_STUDY,
     ),
     Curves(
         "Entries of its matrix",
@@ -102,7 +102,7 @@ PLOTS: tuple[Plot, ...] = (
         Trace("sizes", "entries", ("all", "not zero"), "marked", 1, note="entry_slopes"),
         log_x=True,
         log_y=True,
-        when=SIZES,
+        when=WITH_SIZE_STUDY,
     ),
     Curves(
         "Controls",
@@ -128,7 +128,7 @@ PLOTS: tuple[Plot, ...] = (
         Trace("states_q", "states_v", "states s", "points", 1),
         Trace("played_q0", "played_v0", "played with feedback", "line", 3),
     ),
-    position_played(),
+    position_plot(),
     TimeSeries(
         "Velocity",
         "{v_unit}",
@@ -137,7 +137,7 @@ PLOTS: tuple[Plot, ...] = (
         Line("v_plan", r"v^{\text{plan}}", "limit"),
         select="joint",
     ),
-    control_played(),
+    control_plot(),
     Readout("iteration", "Iterations", "", whole=True),
     Readout("cost", "Cost J", ""),
     Readout("largest_gap", "Largest gap", ""),
@@ -148,7 +148,7 @@ PLOTS: tuple[Plot, ...] = (
     Readout("nonzeros", "Nonzeros of the Jacobian", "", whole=True),
     Readout("density", "Density of the Jacobian", "%"),
     Readout("hessian_density", "Density of the Hessian", "%"),
-    Readout("order", "Order of the rule", "", when=ORDER),
+    Readout("order", "Order of the rule", "", when=WITH_ORDER_STUDY),
     Readout("missed", "Goal missed, feedback", "m"),
     Readout("missed_open", "Goal missed, open loop", "m"),
 )
@@ -203,11 +203,11 @@ def structure_fields(structure: SparsityPattern) -> dict[str, np.ndarray]:
     """Both maps, with the numbers of rows and columns from 1."""
     rows, columns = structure.jacobian.shape
     return {
-        "jacobian": logarithms(structure.jacobian),
-        "jacobian_rows": edges(rows, structure.constraints),
-        "jacobian_columns": edges(columns, structure.variables),
-        "hessian": logarithms(structure.hessian),
-        "hessian_places": edges(len(structure.hessian), structure.variables),
+        "jacobian": log_magnitudes(structure.jacobian),
+        "jacobian_rows": cell_starts(rows, structure.constraints),
+        "jacobian_columns": cell_starts(columns, structure.variables),
+        "hessian": log_magnitudes(structure.hessian),
+        "hessian_places": cell_starts(len(structure.hessian), structure.variables),
     }
 
 

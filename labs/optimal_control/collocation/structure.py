@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csc_array
 
-MOST_CELLS = 160
+MAX_CELLS = 160
 """Rows and columns that are shown; a larger matrix is shown in blocks."""
-LEAST = 1e-6
+MIN_ENTRY = 1e-6
 """An entry smaller than this is shown as if it were so large."""
 
 
@@ -36,13 +36,15 @@ class SparsityPattern:
         return self.hessian_nonzeros / self.variables**2
 
 
-def structure_of(c_y: csc_array, L_yy: csc_array) -> SparsityPattern:
+def sparsity_pattern(c_y: csc_array, L_yy: csc_array) -> SparsityPattern:
     """Of the Jacobian (m, n) and the Hessian (n, n), with their stored zeros."""
     m, n = c_y.shape
-    return SparsityPattern(_largest(c_y), _largest(L_yy), n, m, int(c_y.nnz), int(L_yy.nnz))
+    return SparsityPattern(
+        _block_maxima(c_y), _block_maxima(L_yy), n, m, int(c_y.nnz), int(L_yy.nnz)
+    )
 
 
-def logarithms(sizes: np.ndarray) -> np.ndarray:
+def log_magnitudes(sizes: np.ndarray) -> np.ndarray:
     """log10, NaN where there is no entry."""
     found = np.full(sizes.shape, np.nan)
     there = sizes > 0.0
@@ -50,20 +52,20 @@ def logarithms(sizes: np.ndarray) -> np.ndarray:
     return found
 
 
-def edges(cells: int, length: int) -> np.ndarray:
+def cell_starts(cells: int, length: int) -> np.ndarray:
     """(cells,) the number, from 1, that each cell of a map of `length` rows begins with."""
-    return 1.0 + np.arange(cells) * _block(length)
+    return 1.0 + np.arange(cells) * _block_size(length)
 
 
-def _largest(matrix: csc_array) -> np.ndarray:
-    rows, columns = (_block(length) for length in matrix.shape)
-    found = np.zeros([-(-length // _block(length)) for length in matrix.shape])
+def _block_maxima(matrix: csc_array) -> np.ndarray:
+    rows, columns = (_block_size(length) for length in matrix.shape)
+    found = np.zeros([-(-length // _block_size(length)) for length in matrix.shape])
     entries = matrix.tocoo()
-    sizes = np.maximum(np.abs(entries.data), LEAST)
+    sizes = np.maximum(np.abs(entries.data), MIN_ENTRY)
     np.maximum.at(found, (entries.row // rows, entries.col // columns), sizes)
     return found
 
 
-def _block(length: int) -> int:
+def _block_size(length: int) -> int:
     """Rows in a cell."""
-    return -(-length // MOST_CELLS)
+    return -(-length // MAX_CELLS)

@@ -14,17 +14,17 @@ from labs.algorithms.collocation_schemes import SCHEMES
 from labs.algorithms.sqp import SqpIterate, SqpOptions
 from labs.optimal_control.collocation.params import CollocationParams
 from labs.resumable import Resumable
-from labs.tasks.direct.guesses import resampled
-from labs.tasks.direct.motions import collocated_motion
+from labs.tasks.direct.guesses import resample_motion
+from labs.tasks.direct.motions import collocation_motion
 from labs.tasks.direct.trajectory import PiecewiseTrajectory
 
 ORDER_STEPS = (10, 20, 40, 80)
 """N at which errors are measured."""
-EXACT_STEPS, EXACT_RULE = 160, "hermite-simpson"
+REFERENCE_STEPS, REFERENCE_SCHEME = 160, "hermite-simpson"
 """Of the solution they are errors from."""
-SIZES = (5, 10, 20, 40, 80, 160)
+GRID_SIZES = (5, 10, 20, 40, 80, 160)
 """N at which Newton steps are timed."""
-MOST_UNKNOWNS = 1000
+MAX_UNKNOWNS = 1000
 """Of a system that is solved with a full matrix."""
 REPEATS = 3
 """Of which the shortest counts."""
@@ -65,30 +65,30 @@ def study_order(
     params: CollocationParams, motion: PiecewiseTrajectory
 ) -> Resumable[ConvergenceStudy]:
     """From the present solution, all solved anew."""
-    fine = yield from _solved(params, EXACT_STEPS, EXACT_RULE, motion)
+    fine = yield from _solve_transcription(params, REFERENCE_STEPS, REFERENCE_SCHEME, motion)
     if not fine.converged:
         return NO_STUDY
-    exact = collocated_motion(params.transcription(EXACT_STEPS, EXACT_RULE), fine)
+    exact = collocation_motion(params.transcription(REFERENCE_STEPS, REFERENCE_SCHEME), fine)
     J, errors = fine.values.f, np.zeros((len(ORDER_STEPS), len(SCHEMES)))
     for i, N in enumerate(ORDER_STEPS):
         for j, scheme in enumerate(SCHEMES):
-            at = yield from _solved(params, N, scheme, exact)
+            at = yield from _solve_transcription(params, N, scheme, exact)
             if at.converged:
                 errors[i, j] = abs(at.values.f - J) / abs(J or 1.0)
     return ConvergenceStudy(np.array(ORDER_STEPS, float), errors, NO_STUDY.sizes, NO_STUDY.entries)
 
 
-def study_sizes(
+def study_linear_solves(
     params: CollocationParams, motion: PiecewiseTrajectory, seconds: dict[str, float | np.ndarray]
 ) -> Resumable[ConvergenceStudy]:
     """Near the present solution. Leaves in `seconds` the times of a Newton step's linear system,
     "dense" and "sparse", (k,) [s]."""
     sizes: list[float] = []
     entries, times = [], []
-    for N in SIZES:
+    for N in GRID_SIZES:
         program = params.transcription(N, params.scheme)
-        system = yield from _newton_system(program, _variables(params, program, motion))
-        if sizes and system.shape[0] > MOST_UNKNOWNS:
+        system = yield from _newton_system(program, _initial_variables(params, program, motion))
+        if sizes and system.shape[0] > MAX_UNKNOWNS:
             break
         full, right = system.toarray(), np.ones(system.shape[0])
         spent = []
@@ -116,21 +116,21 @@ def slopes(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.asarray(np.log(y[-1] / y[-2]) / np.log(x[-1] / x[-2]))
 
 
-def _solved(
+def _solve_transcription(
     params: CollocationParams, N: int, scheme: str, motion: PiecewiseTrajectory
 ) -> Resumable[SqpIterate]:
     program, options = params.transcription(N, scheme), SqpOptions(tolerance=1e-10, iterations=60)
-    at = sqp.init(program, _variables(params, program, motion), options)
+    at = sqp.init(program, _initial_variables(params, program, motion), options)
     while not at.stopped:
-        at = yield from sqp.step_in_pieces(program, options, at)
+        at = yield from sqp.resumable_step(program, options, at)
         yield
     return at
 
 
-def _variables(
+def _initial_variables(
     params: CollocationParams, program: Collocation, motion: PiecewiseTrajectory
 ) -> np.ndarray:
-    return program.variables(*resampled(params, motion, program.N))
+    return program.variables(*resample_motion(params, motion, program.N))
 
 
 def _newton_system(program: Collocation, y: np.ndarray) -> Resumable[csc_array]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from labs.algorithms.collocation import Collocation
 from labs.algorithms.sqp import SqpIterate
-from labs.tasks.direct.motions import collocated_motion
+from labs.tasks.direct.motions import collocation_motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +31,7 @@ def costates(program: Collocation, at: SqpIterate) -> Costates:
 
     backward by the trapezoidal rule; limits and constraints of a state push p where they act."""
     assert at.derivatives
-    problem, motion, grid = program.problem, collocated_motion(program, at), program.grid
+    problem, motion, grid = program.problem, collocation_motion(program, at), program.grid
     nx, N, h = problem.dynamics.nx, program.N, motion.T / program.N
     first_after = nx + grid.rows.size
     of_end = at.derivatives.c_y[first_after:].T @ at.lam[first_after:]

@@ -4,7 +4,7 @@ import numpy as np
 
 from labs.models.mechanisms import Mechanism, mechanism
 from labs.optimal_control.ddp.params import DdpParams
-from labs.tasks.motion.playback import Playback, jump_states
+from labs.tasks.motion.playback import Playback, apply_state_jump
 
 VELOCITY_NOISE_RATIO = 10.0
 """[1/s] noise of the measured velocity [rad/s] for each radian of noise of the angle."""
@@ -14,7 +14,7 @@ def apply_impulse(plant: Mechanism, playback: Playback, impulse: float) -> Playb
     """The runs after an impulse [N s] along y has struck the tips of both robots."""
     along_y, n = np.array([0.0, impulse, 0.0]), plant.nq
     jumps = [plant.velocity_jump(x[:n], along_y) for x in playback.x]
-    return jump_states(playback, np.concatenate([np.zeros((2, n)), jumps], axis=1))
+    return apply_state_jump(playback, np.concatenate([np.zeros((2, n)), jumps], axis=1))
 
 
 def sample_noise(

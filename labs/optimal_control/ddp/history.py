@@ -38,7 +38,14 @@ class DdpHistory:
         rows = [np.tile(path, (KEPT_PATHS, 1, 1)) for path in last]
         cost = np.array([at.cost])
         return cls(
-            cost, none, none, none, none, none, _shift_in(rows[0], tip), _shift_in(rows[1], phase)
+            cost,
+            none,
+            none,
+            none,
+            none,
+            none,
+            _append_row(rows[0], tip),
+            _append_row(rows[1], phase),
         )
 
     def append(self, at: DdpIterate, tip: np.ndarray, phase: np.ndarray) -> Self:
@@ -50,16 +57,16 @@ class DdpHistory:
             np.append(self.alpha, at.alpha),
             np.append(self.mu, at.mu),
             np.append(self.gradient, at.gradient),
-            _shift_in(self.tip_paths, tip),
-            _shift_in(self.phase_paths, phase),
+            _append_row(self.tip_paths, tip),
+            _append_row(self.phase_paths, phase),
         )
 
 
-def thin_out(rows: np.ndarray) -> np.ndarray:
+def subsample(rows: np.ndarray) -> np.ndarray:
     """PATH_POINTS of the rows, evenly from the first to the last."""
     return np.asarray(rows[np.linspace(0, len(rows) - 1, PATH_POINTS).round().astype(int)])
 
 
-def _shift_in(rows: np.ndarray, newest: np.ndarray) -> np.ndarray:
+def _append_row(rows: np.ndarray, newest: np.ndarray) -> np.ndarray:
     """The rows moved up by one, the newest last."""
     return np.concatenate([rows[1:], newest[None]])

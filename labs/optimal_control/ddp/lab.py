@@ -13,7 +13,7 @@ from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot
 from labs.models.coordinates import coordinate_labels
 from labs.models.mechanisms import mechanism
 from labs.optimal_control.ddp.disturbances import apply_impulse, sample_noise
-from labs.optimal_control.ddp.history import DdpHistory, thin_out
+from labs.optimal_control.ddp.history import DdpHistory, subsample
 from labs.optimal_control.ddp.params import DdpParams
 from labs.optimal_control.ddp.picture import draw_goal, draw_paths, draw_robots
 from labs.optimal_control.ddp.plots import (
@@ -26,7 +26,7 @@ from labs.optimal_control.ddp.plots import (
 from labs.params import Value
 from labs.problems.optimal_control import OptimalControlProblem
 from labs.scene import Scene
-from labs.tasks.motion.motions import clip_controls, first_guess, resample, tip_path
+from labs.tasks.motion.motions import clip_controls, initial_controls, resample_controls, tip_path
 from labs.tasks.motion.playback import (
     FEEDBACK,
     OPEN_LOOP,
@@ -36,10 +36,10 @@ from labs.tasks.motion.playback import (
     start_playback,
 )
 from labs.tasks.motion.player import (
-    PERIOD,
+    WORLD_PERIOD,
     PlayerState,
     advance_clock,
-    measured_runs,
+    measure_runs,
     play_from_start,
 )
 
@@ -52,9 +52,9 @@ class DdpState(PlayerState):
     """The plan, how it was found, and how it is being played."""
 
     history: DdpHistory
-    paid: np.ndarray
+    run_costs: np.ndarray
     """(2,) cost of the last whole motion with feedback and in open loop; (0,) before it."""
-    pushed: int = 0
+    arrow_steps_left: int = 0
     """World steps the arrow of a push still stays."""
     key: int = 0
     """Of the noise's random numbers; their counter is `steps`."""
@@ -71,7 +71,7 @@ class Ddp(Lab[DdpParams, DdpState]):
         "and without its feedback gains."
     )
     Params = DdpParams
-    period = PERIOD
+    period = WORLD_PERIOD
     plots = PLOTS
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Weak motor": {"limited": True, "limit": 0.3, "horizon": 3.0},
@@ -96,18 +96,18 @@ class Ddp(Lab[DdpParams, DdpState]):
     def init(self, params: DdpParams, rng: np.random.Generator) -> DdpState:
         """The first guess, rolled out, is the first plan; the start at rest, where it diverges."""
         problem = _problem(params)
-        at = ddp.init(problem, _first_guess(params, problem), params.options)
+        at = ddp.init(problem, _guessed_controls(params, problem), params.options)
         if at.stopped:
             X = np.tile(problem.x0, (problem.N + 1, 1))
-            U = first_guess(problem, params.control_scale, 0.0, 0.0)
+            U = initial_controls(problem, params.control_scale, 0.0, 0.0)
             at = replace(at, X=X, U=U, cost=problem.cost.value(X, U))
         plan = NominalTrajectory(at.X, at.U, at.K, params.h)
         return DdpState(
             plan=plan,
             history=DdpHistory.start(at, *_paths(params, at), None),
             playback=start_playback(plan),
-            paid=np.zeros(0),
-            missed=np.zeros(0),
+            run_costs=np.zeros(0),
+            goal_errors=np.zeros(0),
             key=int(rng.integers(2**63)),
         )
 
@@ -123,7 +123,7 @@ class Ddp(Lab[DdpParams, DdpState]):
         history = DdpHistory.start(at, *_paths(params, at), state.history)
         seconds = {phase: np.zeros(0) for phase in PHASES}
         while not at.stopped:
-            at = yield from ddp.step_in_pieces(problem, params.options, at)
+            at = yield from ddp.resumable_step(problem, params.options, at)
             history = history.append(at, *_paths(params, at))
             seconds = {name: np.append(seconds[name], at.seconds[name]) for name in PHASES}
             plan = NominalTrajectory(at.X, at.U, at.K, params.h)
@@ -137,8 +137,8 @@ class Ddp(Lab[DdpParams, DdpState]):
             play_from_start(state, data["plan"], data["failed"]),
             history=data["history"],
             seconds=data["seconds"],
-            pushed=0,
-            paid=np.zeros(0),
+            arrow_steps_left=0,
+            run_costs=np.zeros(0),
         )
 
     def edit(
@@ -157,10 +157,12 @@ class Ddp(Lab[DdpParams, DdpState]):
         if state.trouble:
             return state
         plant = mechanism(params.system, params.payload, params.friction)
-        state, plays = advance_clock(replace(state, pushed=max(state.pushed - 1, 0)))
+        state, plays = advance_clock(
+            replace(state, arrow_steps_left=max(state.arrow_steps_left - 1, 0))
+        )
         if not plays:
             return state
-        playback, pushed = state.playback, state.pushed
+        playback, pushed = state.playback, state.arrow_steps_left
         if "push" in inputs.actions:
             playback, pushed = apply_impulse(plant, playback, params.push), ARROW_STEPS
         substeps = round(self.period / SUBSTEP)
@@ -175,38 +177,41 @@ class Ddp(Lab[DdpParams, DdpState]):
             disturbance,
             noise,
         )
-        state = replace(state, playback=playback, pushed=pushed)
+        state = replace(state, playback=playback, arrow_steps_left=pushed)
         return self._evaluate(params, state) if playback.finished(state.plan) else state
 
     def _evaluate(self, params: DdpParams, state: DdpState) -> DdpState:
         """What each run paid, at the present weights, and where it came to."""
         cost = params.problem(state.plan.N, state.plan.h).cost
         runs = zip(state.playback.X, state.playback.U, strict=True)
-        ends, goal = tip_path(mechanism(params.system), state.playback.X[:, -1]), _goal(params)
+        ends, goal = (
+            tip_path(mechanism(params.system), state.playback.X[:, -1]),
+            _goal_position(params),
+        )
         return replace(
             state,
-            paid=np.array([cost.value(X, U) for X, U in runs]),
-            missed=np.array([np.linalg.norm(end - goal) for end in ends]),
+            run_costs=np.array([cost.value(X, U) for X, U in runs]),
+            goal_errors=np.array([np.linalg.norm(end - goal) for end in ends]),
         )
 
     # What is shown ----------------------------------------------------------------------------
 
     def measure(self, params: DdpParams, state: DdpState) -> Measurement:
         """The two runs, and what the last motion that came to its end cost them."""
-        found = measured_runs(state) | {
+        found = measure_runs(state) | {
             "cost": float(state.history.cost[-1]),
             "iteration": float(len(state.history.alpha)),
         }
         for i, suffix in ((FEEDBACK, ""), (OPEN_LOOP, "_open")):
-            if len(state.paid):
-                found[f"paid{suffix}"] = float(state.paid[i])
+            if len(state.run_costs):
+                found[f"paid{suffix}"] = float(state.run_costs[i])
         return found
 
     def fields(self, params: DdpParams, state: DdpState) -> Mapping[str, np.ndarray]:
         """The iterations so far, and the gains along the motion."""
         return (
             iteration_fields(state.history, state.seconds)
-            | portrait_fields(state.history, _played(state), params.motion.shown_joint)
+            | portrait_fields(state.history, _feedback_states(state), params.motion.shown_joint)
             | plan_gain_fields(state.plan)
         )
 
@@ -217,8 +222,8 @@ class Ddp(Lab[DdpParams, DdpState]):
         """The robot under feedback, its open-loop ghost, and the paths of plan and iterations."""
         playback = state.playback
         draw_robots(scene, params, playback.x, playback.u)
-        draw_paths(scene, params, state.history, state.failed, _played(state))
-        draw_goal(scene, params, playback.x, _goal(params), bool(state.pushed))
+        draw_paths(scene, params, state.history, state.failed, _feedback_states(state))
+        draw_goal(scene, params, playback.x, _goal_position(params), bool(state.arrow_steps_left))
 
     @classmethod
     def prepare(cls) -> None:
@@ -234,8 +239,8 @@ def _problem(params: DdpParams) -> OptimalControlProblem:
     return params.problem(round(params.horizon / params.h), params.h)
 
 
-def _first_guess(params: DdpParams, problem: OptimalControlProblem) -> np.ndarray:
-    return first_guess(problem, params.control_scale, params.guess, params.guess_rate)
+def _guessed_controls(params: DdpParams, problem: OptimalControlProblem) -> np.ndarray:
+    return initial_controls(problem, params.control_scale, params.guess, params.guess_rate)
 
 
 def _initial_controls(
@@ -243,8 +248,10 @@ def _initial_controls(
 ) -> np.ndarray:
     """U to start from: the present solution, if there is one and it is wanted."""
     if params.start == "cold" or not len(state.history.alpha):
-        return _first_guess(params, problem)
-    return clip_controls(problem, resample(state.plan.U, state.plan.h, params.h, problem.N))
+        return _guessed_controls(params, problem)
+    return clip_controls(
+        problem, resample_controls(state.plan.U, state.plan.h, params.h, problem.N)
+    )
 
 
 def _snapshot_data(
@@ -256,18 +263,18 @@ def _snapshot_data(
 def _paths(params: DdpParams, at: DdpIterate) -> tuple[np.ndarray, np.ndarray]:
     """Of the tip (PATH_POINTS, 3), and of the joint shown (PATH_POINTS, 2)."""
     system, joint = mechanism(params.system), params.motion.shown_joint
-    X = thin_out(at.X)
+    X = subsample(at.X)
     return tip_path(system, X), X[:, [joint, system.nq + joint]]
 
 
-def _played(state: DdpState) -> np.ndarray:
+def _feedback_states(state: DdpState) -> np.ndarray:
     """The states (k, nx) under feedback at the plan's steps, as far as it has come."""
     playback = state.playback
     played: np.ndarray = playback.X[FEEDBACK, : playback.clock // state.plan.substeps + 1]
     return played
 
 
-def _goal(params: DdpParams) -> np.ndarray:
+def _goal_position(params: DdpParams) -> np.ndarray:
     """Where the tip should end (3,) [m]."""
     goal = params.motion.goal
     return mechanism(params.system).tip(np.array(goal)) if goal else params.target

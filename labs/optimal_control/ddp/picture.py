@@ -3,7 +3,7 @@
 import numpy as np
 
 from labs.models.mechanisms import mechanism
-from labs.optimal_control.ddp.history import KEPT_PATHS, DdpHistory, thin_out
+from labs.optimal_control.ddp.history import KEPT_PATHS, DdpHistory, subsample
 from labs.optimal_control.ddp.params import DdpParams
 from labs.scene import Scene
 from labs.tasks.motion.motions import tip_path
@@ -42,7 +42,7 @@ def draw_paths(
             scene.trail(f"before {age}", paths[i] - age * spacing, "muted", (i + 1) / KEPT_PATHS)
     scene.trail("plan", paths[-1], "warning" if failed else "reference")
     if len(played) > 1:
-        scene.trail("played", tip_path(mechanism(params.system), thin_out(played)))
+        scene.trail("played", tip_path(mechanism(params.system), subsample(played)))
 
 
 def draw_goal(

@@ -9,40 +9,45 @@ import numpy as np
 
 from labs.algorithms import riccati, sqp
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot
-from labs.optimal_control.direct_methods.methods import SHORT, TRANSCRIPTIONS
+from labs.optimal_control.direct_methods.method_runs import (
+    MethodRuns,
+    initial_runs,
+    outcome_message,
+    run_methods,
+)
+from labs.optimal_control.direct_methods.methods import SHORT_NAMES, TRANSCRIPTIONS
 from labs.optimal_control.direct_methods.params import DirectMethodsParams
 from labs.optimal_control.direct_methods.picture import draw_plans
 from labs.optimal_control.direct_methods.plots import (
     PLOTS,
-    ROWS,
+    STRUCTURE_ROWS,
     comparison_fields,
     iteration_fields,
+    method_readouts,
     plan_fields,
-    race_readouts,
 )
-from labs.optimal_control.direct_methods.race import Entrants, lined_up, run_race, verdict
 from labs.params import Value
 from labs.scene import Scene
 from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots
 from labs.tasks.direct.plan_params import CHOICE_SETTINGS
 from labs.tasks.direct.player import (
     DirectState,
-    advanced,
-    dragged,
-    labels_of,
-    measured,
-    replayed,
+    advance_player,
+    edit_balls,
+    measure_player,
+    plan_labels,
+    play_motion,
 )
-from labs.tasks.direct.tracking import playable
+from labs.tasks.direct.tracking import nominal_trajectory
 from labs.tasks.motion.playback import start_playback
-from labs.tasks.motion.player import PERIOD
+from labs.tasks.motion.player import WORLD_PERIOD
 
 
 @dataclass(kw_only=True)
 class DirectMethodsState(DirectState):
     """The race, and whose motion is being played."""
 
-    race: Entrants
+    race: MethodRuns
     played: str
 
 
@@ -56,7 +61,7 @@ class DirectMethodsLab(Lab[DirectMethodsParams, DirectMethodsState]):
         "each has to solve, see which of them fails and why, and play what they planned."
     )
     Params = DirectMethodsParams
-    period = PERIOD
+    period = WORLD_PERIOD
     plots = PLOTS
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Upright": {"system": "upright"},
@@ -79,15 +84,15 @@ class DirectMethodsLab(Lab[DirectMethodsParams, DirectMethodsState]):
 
     def init(self, params: DirectMethodsParams, rng: np.random.Generator) -> DirectMethodsState:
         """The first guess is the first motion of all three."""
-        race = lined_up(params)
+        race = initial_runs(params)
         entrant = race[params.played]
-        plan = playable(params, entrant.motion)
+        plan = nominal_trajectory(params, entrant.motion)
         return DirectMethodsState(
             motion=entrant.motion,
             plan=plan,
             history=entrant.history,
             playback=start_playback(plan),
-            missed=np.zeros(0),
+            goal_errors=np.zeros(0),
             race=race,
             played=params.played,
         )
@@ -99,11 +104,11 @@ class DirectMethodsLab(Lab[DirectMethodsParams, DirectMethodsState]):
     ) -> Iterator[Snapshot | None]:
         """A snapshot is an iteration of each method that has not stopped."""
         seconds = dict[str, float]()
-        for race in run_race(params, state.race, seconds):
+        for race in run_methods(params, state.race, seconds):
             if race is None:
                 yield None
                 continue
-            done = verdict(race) if all(at.stopped for at in race.values()) else ""
+            done = outcome_message(race) if all(at.stopped for at in race.values()) else ""
             iteration = max(1, *(at.history.iterations for at in race.values()))
             yield Snapshot(iteration, {"race": race, "seconds": dict(seconds)}, done)
 
@@ -113,13 +118,13 @@ class DirectMethodsLab(Lab[DirectMethodsParams, DirectMethodsState]):
         """Whatever is taken in is played from its start."""
         seconds = snapshot.data.get("seconds", {})
         state = replace(state, race=snapshot.data["race"], seconds=seconds)
-        return _chosen(params, state)
+        return _play_method(params, state)
 
     def edit(
         self, params: DirectMethodsParams, handle: str, point: tuple[float, float, float]
     ) -> Mapping[str, Value]:
         """The balls are the UR5's target and its obstacle."""
-        return dragged(params, handle, point)
+        return edit_balls(params, handle, point)
 
     # The world's clock ------------------------------------------------------------------------
 
@@ -128,14 +133,14 @@ class DirectMethodsLab(Lab[DirectMethodsParams, DirectMethodsState]):
     ) -> DirectMethodsState:
         """10 ms of the motion; at its end a rest, and then from the start."""
         if state.played != params.played:
-            state = _chosen(params, state)
-        return advanced(params, state)
+            state = _play_method(params, state)
+        return advance_player(params, state)
 
     # What is shown ----------------------------------------------------------------------------
 
     def measure(self, params: DirectMethodsParams, state: DirectMethodsState) -> Measurement:
         """The run beside its plan, and how each method ended."""
-        return measured(params, state) | race_readouts(state.race)
+        return measure_player(params, state) | method_readouts(state.race)
 
     def fields(
         self, params: DirectMethodsParams, state: DirectMethodsState
@@ -156,7 +161,7 @@ class DirectMethodsLab(Lab[DirectMethodsParams, DirectMethodsState]):
         return {"verdicts": "\n".join(lines)}
 
     def labels(self, params: DirectMethodsParams) -> Mapping[str, str | tuple[str, ...]]:
-        return labels_of(params) | {"methods": SHORT, "rows": ROWS}
+        return plan_labels(params) | {"methods": SHORT_NAMES, "rows": STRUCTURE_ROWS}
 
     def draw(self, scene: Scene, params: DirectMethodsParams, state: DirectMethodsState) -> None:
         """The three robots by their plans; or the one played, with its open-loop ghost."""
@@ -173,13 +178,13 @@ class DirectMethodsLab(Lab[DirectMethodsParams, DirectMethodsState]):
         sqp.prepare()
         riccati.prepare()
         params = DirectMethodsParams(pieces=4.0, segments=2.0, steps=1.0)
-        race = lined_up(params)
-        next(at for at in run_race(params, race, {}) if at)
+        race = initial_runs(params)
+        next(at for at in run_methods(params, race, {}) if at)
 
 
-def _chosen(params: DirectMethodsParams, state: DirectMethodsState) -> DirectMethodsState:
+def _play_method(params: DirectMethodsParams, state: DirectMethodsState) -> DirectMethodsState:
     """With the plan that is to be played, from its start."""
     entrant = state.race[params.played]
-    plan = playable(params, entrant.motion)
-    state = replayed(state, entrant.motion, plan, entrant.history, entrant.failed)
+    plan = nominal_trajectory(params, entrant.motion)
+    state = play_motion(state, entrant.motion, plan, entrant.history, entrant.failed)
     return replace(state, played=params.played)

@@ -14,7 +14,7 @@ from labs.problems.continuous_control import ContinuousProblem
 from labs.problems.nonlinear_program import NonlinearProgram
 from labs.tasks.direct.guesses import Guess
 from labs.tasks.direct.motions import (
-    collocated_motion,
+    collocation_motion,
     multiple_shooting_motion,
     single_shooting_motion,
 )
@@ -25,7 +25,7 @@ TRANSCRIPTIONS: Mapping[str, str] = {
     "multiple": "Multiple shooting",
     "collocation": "Collocation",
 }
-SHORT = ("single", "multiple", "collocation")
+SHORT_NAMES = ("single", "multiple", "collocation")
 """Where there is little room."""
 
 
@@ -46,13 +46,13 @@ def transcribe(problem: ContinuousProblem, N: int, m: int, M: int) -> Mapping[st
     """By each method, with the control held on N pieces: of M steps of Runge-Kutta 4 in shooting,
     in m segments; each one step of the midpoint rule in collocation."""
     return {
-        "single": _single(SingleShooting(problem, N, M)),
-        "multiple": _multiple(MultipleShooting(problem, N, m, M)),
+        "single": _single_shooting(SingleShooting(problem, N, M)),
+        "multiple": _multiple_shooting(MultipleShooting(problem, N, m, M)),
         "collocation": _collocation(Collocation(problem, N)),
     }
 
 
-def _single(shooting: SingleShooting) -> Transcription:
+def _single_shooting(shooting: SingleShooting) -> Transcription:
     """Of the guess it takes the controls alone."""
     return Transcription(
         shooting,
@@ -62,7 +62,7 @@ def _single(shooting: SingleShooting) -> Transcription:
     )
 
 
-def _multiple(shooting: MultipleShooting) -> Transcription:
+def _multiple_shooting(shooting: MultipleShooting) -> Transcription:
     return Transcription(
         shooting,
         lambda guess: shooting.variables(*guess),
@@ -75,6 +75,6 @@ def _collocation(program: Collocation) -> Transcription:
     return Transcription(
         program,
         lambda guess: program.variables(*guess),
-        lambda at: collocated_motion(program, at),
+        lambda at: collocation_motion(program, at),
         program.grid.controls,
     )

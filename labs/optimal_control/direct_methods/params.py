@@ -3,10 +3,10 @@
 from labs.optimal_control.direct_methods.methods import TRANSCRIPTIONS
 from labs.params import Group
 from labs.tasks.direct.params import WORLD, DirectParams
-from labs.tasks.direct.plan_params import LIGHT
+from labs.tasks.direct.plan_params import LIGHT_SYSTEMS
 
-MOST_PIECES, MOST_STEPS = 40, 4
-MOST_HEAVY_PIECES = 12
+MAX_PIECES, MAX_STEPS = 40, 4
+MAX_HEAVY_PIECES = 12
 """Of the UR5, whose derivatives cost more."""
 VIEWS = {"plans": "The three plans", "played": "One plan, played"}
 
@@ -22,24 +22,22 @@ class DirectMethodsParams(DirectParams):
     played: str = WORLD.choice("collocation", TRANSCRIPTIONS, "Play", key=True)
     """Whose plan the simulator plays: alone (open loop), and with a regulator about it."""
 
-    pieces: float = TRANSCRIPTION.knob(
-        20.0, 4.0, MOST_PIECES, "N", "", "Pieces", step=1.0, key=True
-    )
+    pieces: float = TRANSCRIPTION.knob(20.0, 4.0, MAX_PIECES, "N", "", "Pieces", step=1.0, key=True)
     """How many pieces the control is held on, in all three; of the UR5 at most 12. They are the
     steps of collocation, too."""
     segments: float = TRANSCRIPTION.knob(
-        5.0, 2.0, MOST_PIECES, "m", "", "Segments", step=1.0, key=True
+        5.0, 2.0, MAX_PIECES, "m", "", "Segments", step=1.0, key=True
     )
     """Of multiple shooting: how often its integration begins anew; at most once a piece."""
     steps: float = TRANSCRIPTION.knob(
-        2.0, 1.0, MOST_STEPS, "M", "", "Steps a piece", step=1.0, when={"system": LIGHT}
+        2.0, 1.0, MAX_STEPS, "M", "", "Steps a piece", step=1.0, when={"system": LIGHT_SYSTEMS}
     )
     """Steps of Runge-Kutta 4 in each piece, in both kinds of shooting. Of the UR5 it is one."""
 
     @property
     def N(self) -> int:
         N = round(self.pieces)
-        return N if self.system in LIGHT else min(N, MOST_HEAVY_PIECES)
+        return N if self.system in LIGHT_SYSTEMS else min(N, MAX_HEAVY_PIECES)
 
     @property
     def m(self) -> int:
@@ -48,4 +46,4 @@ class DirectMethodsParams(DirectParams):
 
     @property
     def M(self) -> int:
-        return round(self.steps) if self.system in LIGHT else 1
+        return round(self.steps) if self.system in LIGHT_SYSTEMS else 1

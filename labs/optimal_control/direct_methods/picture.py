@@ -8,14 +8,14 @@ import numpy as np
 import pinocchio as pin
 
 from labs.models.arms import Arm
+from labs.optimal_control.direct_methods.method_runs import MethodRun, MethodRuns
 from labs.optimal_control.direct_methods.methods import TRANSCRIPTIONS
 from labs.optimal_control.direct_methods.params import DirectMethodsParams
-from labs.optimal_control.direct_methods.race import Entrant, Entrants
 from labs.scene import Color, Scene
 from labs.shapes import Vector3, translation
-from labs.tasks.direct.history import drawn
-from labs.tasks.direct.picture import draw_goal, joined
-from labs.tasks.direct.systems import system
+from labs.tasks.direct.history import shift_in_time
+from labs.tasks.direct.picture import draw_goal, join_pieces
+from labs.tasks.direct.systems import rest_to_rest_task
 from labs.tasks.motion.playback import SUBSTEP
 
 COLORS: Mapping[str, Color] = {
@@ -46,11 +46,11 @@ LAYOUTS: Mapping[str, RowLayout] = {
     "pendulum": RowLayout(((1.3, 0.75, 1.2), (-0.4, 0.0, 0.72)), 0.4, (0.0, 0.0, 0.12)),
     "double-pendulum": RowLayout(((2.2, 1.1, 2.0), (-0.5, 0.0, 1.15)), 0.6, (0.0, 0.0, 0.1)),
     "cart-pole": RowLayout(((2.2, 0.6, 2.0), (-0.45, 0.0, 0.6)), 0.6, (0.0, -1.0, 0.72)),
-    "ur5": RowLayout(system("ur5").camera, 0.0, (0.0, 0.0, 0.07)),
+    "ur5": RowLayout(rest_to_rest_task("ur5").camera, 0.0, (0.0, 0.0, 0.07)),
 }
 
 
-def draw_plans(scene: Scene, params: DirectMethodsParams, race: Entrants, clock: int) -> None:
+def draw_plans(scene: Scene, params: DirectMethodsParams, race: MethodRuns, clock: int) -> None:
     """Each at the same time of its own plan, with the path of its tip, parted where it does not
     join. Who has failed is a ghost."""
     layout = LAYOUTS[params.task.motion]
@@ -59,7 +59,7 @@ def draw_plans(scene: Scene, params: DirectMethodsParams, race: Entrants, clock:
         offset = np.array([-layout.depth * i, 0.0, 0.0])
         _draw_plan(scene, params, name, at, clock, offset)
         if len(params.task.goal):
-            scene.sphere(f"goal of {name}", params.goal_place + offset, 0.022, "muted")
+            scene.sphere(f"goal of {name}", params.goal_position + offset, 0.022, "muted")
     if not len(params.task.goal):
         draw_goal(scene, params)
 
@@ -68,20 +68,20 @@ def _draw_plan(
     scene: Scene,
     params: DirectMethodsParams,
     name: str,
-    at: Entrant,
+    at: MethodRun,
     clock: int,
     offset: np.ndarray,
 ) -> None:
     task, layout = params.task, LAYOUTS[params.task.motion]
     q = at.motion.state(clock * SUBSTEP)[: task.mechanism.nq]
-    body = _dressed(params.system, name) if layout.depth else task.mechanism.arm
+    body = _colored_arm(params.system, name) if layout.depth else task.mechanism.arm
     ghost = at.failed or (not layout.depth and name != "collocation")
     scene.arm(f"robot of {name}", body, q, ghost=ghost)
     tips = at.history.tips[-1]
     times = np.linspace(0.0, at.motion.T, len(tips) + 1)[:-1, None]
     times = times + np.linspace(0.0, at.motion.T / len(tips), tips.shape[1])
-    paths = tips - drawn(params.task, np.zeros_like(tips), times) + offset
-    for i, run in enumerate(joined(paths), 1):
+    paths = tips - shift_in_time(params.task, np.zeros_like(tips), times) + offset
+    for i, run in enumerate(join_pieces(paths), 1):
         scene.trail(f"path of {name}, piece {i}", run, "warning" if at.failed else COLORS[name])
     place = np.array(layout.label) + offset
     if not layout.depth:
@@ -90,9 +90,9 @@ def _draw_plan(
 
 
 @cache
-def _dressed(system_name: str, method: str) -> Arm:
+def _colored_arm(system_name: str, method: str) -> Arm:
     """The robot of a system, in the colour and at the place of a method."""
-    task = system(system_name)
+    task = rest_to_rest_task(system_name)
     arm, depth = task.mechanism.arm, LAYOUTS[task.motion].depth
     moved = translation(-depth * list(TRANSCRIPTIONS).index(method), 0.0, 0.0)
     model = pin.Model(arm.model)

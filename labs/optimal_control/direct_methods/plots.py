@@ -5,21 +5,27 @@ from typing import Literal
 
 import numpy as np
 
-from labs.optimal_control.direct_methods.methods import SHORT
-from labs.optimal_control.direct_methods.race import Entrants
+from labs.optimal_control.direct_methods.method_runs import MethodRuns
+from labs.optimal_control.direct_methods.methods import SHORT_NAMES
 from labs.plots import Bars, Curves, Matrix, Note, Plot, Readout, Trace
-from labs.tasks.direct.plots import control_played, position_played
+from labs.tasks.direct.plots import control_plot, position_plot
 
 SERIES = (1, 2, 4)
 """Colours of the methods, near those of their robots."""
-ROWS = ("variables", "constraints", "nonzeros of Jacobian", "nonzeros of Hessian", "iterations")
+STRUCTURE_ROWS = (
+    "variables",
+    "constraints",
+    "nonzeros of Jacobian",
+    "nonzeros of Hessian",
+    "iterations",
+)
 
 
 def _traces(x: str, y: str, style: Literal["line", "marked"] = "line") -> tuple[Trace, ...]:
     """One for each method, in its own colour."""
     return tuple(
         Trace(f"{x}_{name}", f"{y}_{name}", name, style, series)
-        for name, series in zip(SHORT, SERIES, strict=True)
+        for name, series in zip(SHORT_NAMES, SERIES, strict=True)
     )
 
 
@@ -47,17 +53,17 @@ PLOTS: tuple[Plot, ...] = (
     Bars("Nonlinearity", "nonlinearity", r"\eta", "", names="methods"),
     Bars("Density", "density", r"\rho", "%", names="methods"),
     Note("How each fares", "verdicts"),
-    position_played("Position played"),
-    control_played("Control played"),
-    *(Readout(f"iterations_{name}", f"Iterations, {name}", "", whole=True) for name in SHORT),
-    *(Readout(f"cost_{name}", f"Cost, {name}", "") for name in SHORT),
+    position_plot("Position played"),
+    control_plot("Control played"),
+    *(Readout(f"iterations_{name}", f"Iterations, {name}", "", whole=True) for name in SHORT_NAMES),
+    *(Readout(f"cost_{name}", f"Cost, {name}", "") for name in SHORT_NAMES),
     Readout("T", "Time T", "s", when={"objective": ("least-time",)}),
     Readout("missed", "Goal missed, feedback", "m"),
     Readout("missed_open", "Goal missed, open loop", "m"),
 )
 
 
-def race_readouts(race: Entrants) -> dict[str, float]:
+def method_readouts(race: MethodRuns) -> dict[str, float]:
     """Numbers of each method."""
     found = {}
     for name, at in race.items():
@@ -68,7 +74,7 @@ def race_readouts(race: Entrants) -> dict[str, float]:
     return found
 
 
-def iteration_fields(race: Entrants) -> dict[str, np.ndarray]:
+def iteration_fields(race: MethodRuns) -> dict[str, np.ndarray]:
     """Numbers of all iterations so far."""
     found = {}
     for name, at in race.items():
@@ -79,7 +85,7 @@ def iteration_fields(race: Entrants) -> dict[str, np.ndarray]:
     return found
 
 
-def plan_fields(race: Entrants, joint: int, u_0: np.ndarray) -> dict[str, np.ndarray]:
+def plan_fields(race: MethodRuns, joint: int, u_0: np.ndarray) -> dict[str, np.ndarray]:
     """The motions planned, of the joint that tells most, broken where they do not join; and the
     first control, in its unit."""
     found = {}
@@ -93,7 +99,7 @@ def plan_fields(race: Entrants, joint: int, u_0: np.ndarray) -> dict[str, np.nda
 
 
 def comparison_fields(
-    race: Entrants, seconds: Mapping[str, float | np.ndarray]
+    race: MethodRuns, seconds: Mapping[str, float | np.ndarray]
 ) -> dict[str, np.ndarray]:
     """What the programmes are like, a column or a bar for each method."""
     all_of = [at.structure for at in race.values()]

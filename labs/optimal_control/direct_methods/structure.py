@@ -10,13 +10,13 @@ from labs.algorithms.sqp import SqpIterate
 from labs.optimal_control.direct_methods.methods import Transcription
 from labs.resumable import Resumable
 
-LARGEST = 400
+MAX_ROWS = 400
 """Rows of the equations whose condition number is computed, at most."""
 LARGEST_CONDITION = 1e15
 """Beyond it a condition number is rounding alone."""
 ROUNDING = 1e-12
 """What linear constraints miss."""
-CHANGE = 0.1
+CONTROL_CHANGE = 0.1
 """[u_0] of the first control, by which it is seen how far the constraints are from linear."""
 
 
@@ -35,8 +35,9 @@ class ProgramStructure:
     """Of the equations of a Newton step, [L_yy c_y'; c_y 0], with controls in units of u_0;
     0 where it is not known, or not to be told from singular."""
     nonlinearity: float = 0.0
-    """What the linearised constraints miss when the first control changes by CHANGE u_0, in parts
-    of what they foretell: |c(y + p) - c(y) - c_y p| / |c_y p|; 0 where it is not known yet."""
+    """What the linearised constraints miss when the first control changes by CONTROL_CHANGE u_0, in
+    parts of what they foretell: |c(y + p) - c(y) - c_y p| / |c_y p|; 0 where it is not known
+    yet."""
 
     @property
     def nonzeros(self) -> int:
@@ -48,7 +49,7 @@ class ProgramStructure:
         return self.nonzeros / (self.variables * (self.variables + self.constraints))
 
 
-def structure_of(
+def program_structure(
     method: Transcription, at: SqpIterate, u_0: np.ndarray, whole: bool
 ) -> Resumable[ProgramStructure]:
     """At an iterate that has a value; with condition and nonlinearity if it is to be whole."""
@@ -59,10 +60,10 @@ def structure_of(
     sizes = (len(y), len(at.values.c) + len(at.values.g), d.c_y.nnz + d.g_y.nnz, L_yy.nnz)
     if not whole:
         return ProgramStructure(*sizes)
-    condition = _condition(L_yy, d.c_y, method.controls, u_0)
+    condition = _condition_number(L_yy, d.c_y, method.controls, u_0)
     yield
     p = np.zeros(len(y))
-    p[method.controls[0]] = CHANGE * u_0
+    p[method.controls[0]] = CONTROL_CHANGE * u_0
     foretold = d.c_y @ p
     change = program.values(y + p).c - at.values.c
     size = float(np.linalg.norm(foretold))
@@ -70,9 +71,11 @@ def structure_of(
     return ProgramStructure(*sizes, condition, missed if ROUNDING < missed < np.inf else 0.0)
 
 
-def _condition(L_yy: csc_array, c_y: csc_array, controls: np.ndarray, u_0: np.ndarray) -> float:
+def _condition_number(
+    L_yy: csc_array, c_y: csc_array, controls: np.ndarray, u_0: np.ndarray
+) -> float:
     """The ratio of the largest and the least singular value."""
-    if sum(c_y.shape) > LARGEST:
+    if sum(c_y.shape) > MAX_ROWS:
         return 0.0
     scale = np.ones(c_y.shape[1])
     scale[controls] = u_0

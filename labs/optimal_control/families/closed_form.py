@@ -7,7 +7,7 @@ linear in (X, Y) with P = Y X^-1: (X, Y)' = [A, -B R^-1 B'; -Q, -A'] (X, Y).
 import numpy as np
 from scipy.linalg import expm
 
-from labs.optimal_control.families.motion import MethodMotion, instants
+from labs.optimal_control.families.motion import MethodMotion, time_grid
 from labs.optimal_control.families.params import FamiliesParams
 
 
@@ -25,7 +25,7 @@ def closed_form(params: FamiliesParams, x0: np.ndarray, T: float) -> MethodMotio
     """The optimal motion of the mass from x0 (2,), if it meets no limit."""
     if params.system != "mass":
         return None
-    t = instants(T)
+    t = time_grid(T)
     A = np.array([[0.0, 1.0], [0.0, 0.0]])
     B = np.array([[0.0], [1.0 / params.body.inertia]])
     P_0 = riccati(params, np.array([T]))[0]

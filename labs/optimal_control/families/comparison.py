@@ -9,13 +9,15 @@ from scipy.interpolate import CubicSpline
 from labs.optimal_control.families.motion import MethodMotion
 from labs.optimal_control.families.params import FamiliesParams
 
-TINY = 1e-12
+NEGLIGIBLE = 1e-12
 
 
-def gap(curves: np.ndarray, others: np.ndarray, size: np.ndarray | None = None) -> float:
+def relative_difference(
+    curves: np.ndarray, others: np.ndarray, size: np.ndarray | None = None
+) -> float:
     """The largest distance of two (k, 2), each column in parts of its largest value [%]."""
     size = np.abs(others).max(axis=0) if size is None else size
-    return float(100.0 * (np.abs(curves - others).max(axis=0) / np.maximum(size, TINY)).max())
+    return float(100.0 * (np.abs(curves - others).max(axis=0) / np.maximum(size, NEGLIGIBLE)).max())
 
 
 def tail_gaps(
@@ -23,14 +25,14 @@ def tail_gaps(
 ) -> Mapping[str, float]:
     """By how much a tail misses the optimal motion, and its cost what was left of J [%]."""
     rest = np.stack([np.interp(tail.t, optimal.t, column) for column in optimal.X.T], axis=1)
-    left = optimal.cost - paid_until(params, optimal, float(tail.t[0]))
+    left = optimal.cost - cost_until(params, optimal, float(tail.t[0]))
     return {
-        "tail_gap": gap(tail.X, rest, np.abs(optimal.X).max(axis=0)),
-        "tail_cost_gap": 100.0 * abs(tail.cost - left) / max(optimal.cost, TINY),
+        "tail_gap": relative_difference(tail.X, rest, np.abs(optimal.X).max(axis=0)),
+        "tail_cost_gap": 100.0 * abs(tail.cost - left) / max(optimal.cost, NEGLIGIBLE),
     }
 
 
-def paid_until(params: FamiliesParams, motion: MethodMotion, t: float) -> float:
+def cost_until(params: FamiliesParams, motion: MethodMotion, t: float) -> float:
     """int l dt from 0 to t [s], by cubics through the samples of l."""
     rate = params.cost.running(motion.X, motion.U[:, None])
     return float(CubicSpline(motion.t, rate).integrate(0.0, t))

@@ -16,21 +16,21 @@ import numpy as np
 
 from labs.algorithms import backward_recursion, hjb
 from labs.algorithms.hjb import StateGrid, ValueFunction
-from labs.algorithms.indirect import minimiser
+from labs.algorithms.indirect import hamiltonian_minimiser
 from labs.optimal_control.families.cost import SwingCost
 from labs.optimal_control.families.motion import MethodMotion, no_motion
 from labs.optimal_control.families.params import FamiliesParams
-from labs.optimal_control.families.tables import integrate, nearest_node, tabulate
+from labs.optimal_control.families.tables import discretize_to_mdp, integrate, nearest_node
 from labs.problems.continuous_control import ContinuousProblem
 from labs.resumable import Resumable, timed
 
-SHARES = 8
+TABLE_PARTS = 8
 """Parts in which a table is made, each of which is seen."""
-KEPT = 64 * 2**20
+CACHE_BYTES = 64 * 2**20
 """[bytes] Of tables, as far as there are more than one of each kind."""
-COARSER = 15
+SLOPE_INTERVALS = 15
 """The slope of a table with steps is taken over one of so many parts of an axis."""
-LEVELS = 5
+HJB_LEVELS = 5
 """Of u among which HJB's minimum is looked for before it is refined."""
 
 
@@ -62,7 +62,7 @@ class CostToGoTable:
         """(k, 2) of V at states X (k, 2) and times t (k,): of dynamic programming's steps, over
         several cells."""
         V = self.function
-        reach = 1 if self.policy is None else max(1, len(self.grid.axes[0]) // COARSER)
+        reach = 1 if self.policy is None else max(1, len(self.grid.axes[0]) // SLOPE_INTERVALS)
         return np.array([V.gradient(x, at, 0.5 * reach) for x, at in zip(X, t, strict=True)])
 
 
@@ -74,7 +74,7 @@ class PartialTable(NamedTuple):
     table: CostToGoTable | None
 
 
-_kept: OrderedDict[Hashable, CostToGoTable] = OrderedDict()
+_table_cache: OrderedDict[Hashable, CostToGoTable] = OrderedDict()
 
 
 @lru_cache(maxsize=8)
@@ -85,25 +85,30 @@ def final_values(cost: SwingCost, grid: StateGrid) -> np.ndarray:
     return values
 
 
-def make_table(params: FamiliesParams, method: str, nodes: int) -> Iterator[PartialTable | None]:
-    """By "hjb" or "dp", in SHARES parts, the last with the table; None where it may pause within
-    one."""
+def compute_table(params: FamiliesParams, method: str, nodes: int) -> Iterator[PartialTable | None]:
+    """By "hjb" or "dp", in TABLE_PARTS parts, the last with the table; None where it may pause
+    within one."""
     numbers = (params.hjb_steps, 0.0) if method == "hjb" else (params.dp_steps, params.levels)
     problem = (params.system, params.cost, params.u_max, params.horizon)
     key = (method, nodes, numbers, problem)
-    table = _kept.get(key)
+    table = _table_cache.get(key)
     if table:
-        for share in range(1, SHARES):
-            yield PartialTable(share / SHARES, table.V[-1 - _done(len(table.V) - 1, share)], None)
+        for share in range(1, TABLE_PARTS):
+            yield PartialTable(
+                share / TABLE_PARTS, table.V[-1 - _steps_done(len(table.V) - 1, share)], None
+            )
     else:
-        table = yield from {"hjb": _make_hjb, "dp": _make_dp}[method](params, nodes)
-        _kept[key] = table
-        while len(_kept) > 2 and sum(each.V.nbytes for each in _kept.values()) > KEPT:
-            _kept.popitem(last=False)
+        table = yield from {"hjb": _compute_hjb, "dp": _compute_dp}[method](params, nodes)
+        _table_cache[key] = table
+        while (
+            len(_table_cache) > 2
+            and sum(each.V.nbytes for each in _table_cache.values()) > CACHE_BYTES
+        ):
+            _table_cache.popitem(last=False)
     yield PartialTable(1.0, table.V[0], table)
 
 
-def _make_hjb(
+def _compute_hjb(
     params: FamiliesParams, nodes: int
 ) -> Generator[PartialTable | None, None, CostToGoTable]:
     N, spent = round(params.hjb_steps), {"all": 0.0}
@@ -112,40 +117,40 @@ def _make_hjb(
     V[N] = final_values(params.cost, grid)
     begun = perf_counter()
     way = hjb.characteristics(problem, grid, problem.T / N)
-    tried = hjb.controls(problem, LEVELS)
+    tried = hjb.control_levels(problem, HJB_LEVELS)
     spent["all"] += perf_counter() - begun
-    for share in range(1, SHARES + 1):
-        for k in range(_done(N, share - 1), _done(N, share)):
+    for share in range(1, TABLE_PARTS + 1):
+        for k in range(_steps_done(N, share - 1), _steps_done(N, share)):
             V[N - k - 1] = yield from timed(hjb.step(V[N - k], way, tried), spent, "all")
-        if share < SHARES:
-            yield PartialTable(share / SHARES, V[N - _done(N, share)], None)
+        if share < TABLE_PARTS:
+            yield PartialTable(share / TABLE_PARTS, V[N - _steps_done(N, share)], None)
     return CostToGoTable(grid, problem.T, V, spent["all"])
 
 
-def _make_dp(
+def _compute_dp(
     params: FamiliesParams, nodes: int
 ) -> Generator[PartialTable | None, None, CostToGoTable]:
     N, spent = round(params.dp_steps), {"all": 0.0}
     problem, grid = params.problem(np.zeros(2), params.horizon), params.grid(nodes)
-    levels = hjb.controls(problem, round(params.levels))
-    mdp = yield from timed(tabulate(problem, grid, problem.T / N, levels), spent, "all")
+    levels = hjb.control_levels(problem, round(params.levels))
+    mdp = yield from timed(discretize_to_mdp(problem, grid, problem.T / N, levels), spent, "all")
     stage = backward_recursion.init(final_values(params.cost, grid).ravel())
     V, policy = np.empty((N + 1, *grid.shape)), np.empty((N, len(grid.nodes)), np.int16)
     V[N] = stage.V.reshape(grid.shape)
-    for share in range(1, SHARES + 1):
+    for share in range(1, TABLE_PARTS + 1):
         begun = perf_counter()
-        for k in range(_done(N, share - 1), _done(N, share)):
+        for k in range(_steps_done(N, share - 1), _steps_done(N, share)):
             stage = backward_recursion.step(mdp, stage)
             V[N - k - 1], policy[N - k - 1] = stage.V.reshape(grid.shape), stage.policy
         spent["all"] += perf_counter() - begun
-        if share < SHARES:
-            yield PartialTable(share / SHARES, V[N - _done(N, share)], None)
+        if share < TABLE_PARTS:
+            yield PartialTable(share / TABLE_PARTS, V[N - _steps_done(N, share)], None)
     return CostToGoTable(grid, problem.T, V, spent["all"], policy)
 
 
-def _done(N: int, share: int) -> int:
+def _steps_done(N: int, share: int) -> int:
     """Steps of N that are done after so many shares."""
-    return N * share // SHARES
+    return N * share // TABLE_PARTS
 
 
 # Motions --------------------------------------------------------------------------------------
@@ -158,7 +163,7 @@ def follow_gradient(problem: ContinuousProblem, table: CostToGoTable) -> Resumab
     V, cost, x = table.function, 0.0, problem.x0
     for k in range(len(t)):
         X[k], P[k] = x, V.gradient(x, t[k])
-        u = minimiser(problem, X[k : k + 1], P[k : k + 1])
+        u = hamiltonian_minimiser(problem, X[k : k + 1], P[k : k + 1])
         U[k] = u[0, 0]
         if k < len(t) - 1:
             ends, paid = integrate(problem, X[k : k + 1], u, t[k + 1] - t[k])

@@ -12,14 +12,14 @@ from labs.optimal_control.families.params import FamiliesParams
 from labs.optimal_control.families.picture import draw_bodies, draw_values, state_at
 from labs.optimal_control.families.plots import (
     PLOTS,
-    account,
+    method_notes,
     motion_fields,
     study_fields,
     table_fields,
 )
 from labs.optimal_control.families.side_by_side import (
     FAMILY_NAMES,
-    UNKNOWN,
+    UNKNOWN_GAP,
     Results,
     no_results,
     solve_side_by_side,
@@ -27,7 +27,7 @@ from labs.optimal_control.families.side_by_side import (
 from labs.params import Value
 from labs.scene import Scene
 
-REST = 0.8
+REST_DURATION = 0.8
 """[s] between the end of a motion and its start anew."""
 
 
@@ -80,7 +80,7 @@ class Families(Lab[FamiliesParams, FamiliesState]):
                 parts.append(1.0 if at.over else at.study.progress(params.study))
             progress = sum(parts) / len(parts)
             data = {"results": at, "seconds": dict(seconds)}
-            yield Snapshot(rounds, data, outcome(at) if at.over else "", progress)
+            yield Snapshot(rounds, data, outcome_message(at) if at.over else "", progress)
 
     def accept(
         self, params: FamiliesParams, state: FamiliesState, snapshot: Snapshot
@@ -104,7 +104,7 @@ class Families(Lab[FamiliesParams, FamiliesState]):
     def step(self, params: FamiliesParams, inputs: Inputs, state: FamiliesState) -> FamiliesState:
         """10 ms of all motions; at their end a rest, and then from the start."""
         steps, clock = state.steps + 1, state.clock + 1
-        if clock * self.period > params.horizon + REST:
+        if clock * self.period > params.horizon + REST_DURATION:
             clock = 0
         return replace(state, t=steps * self.period, steps=steps, clock=clock)
 
@@ -114,7 +114,7 @@ class Families(Lab[FamiliesParams, FamiliesState]):
         """Of each method its cost, and how close their answers are."""
         at = state.results
         costs = {f"cost_{name}": motion.cost for name, motion in at.motions.items() if motion.known}
-        gaps = {name: value for name, value in at.gaps.items() if value != UNKNOWN}
+        gaps = {name: value for name, value in at.gaps.items() if value != UNKNOWN_GAP}
         return costs | gaps
 
     def fields(self, params: FamiliesParams, state: FamiliesState) -> Mapping[str, np.ndarray]:
@@ -126,7 +126,7 @@ class Families(Lab[FamiliesParams, FamiliesState]):
         )
 
     def notes(self, params: FamiliesParams, state: FamiliesState) -> Mapping[str, str]:
-        return {"account": account(state.results)}
+        return {"account": method_notes(state.results)}
 
     def labels(self, params: FamiliesParams) -> Mapping[str, str | tuple[str, ...]]:
         slides = params.system == "mass"
@@ -152,7 +152,7 @@ class Families(Lab[FamiliesParams, FamiliesState]):
             pass
 
 
-def outcome(at: Results) -> str:
+def outcome_message(at: Results) -> str:
     """In a sentence: who has found what."""
     failed = [name for name, motion in at.motions.items() if not motion.converged]
     costs = [motion.cost for motion in at.motions.values() if motion.converged]

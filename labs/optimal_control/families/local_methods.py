@@ -19,7 +19,7 @@ MESH = 61
 OPTIONS = sqp.SqpOptions(hessian="exact", tolerance=1e-6, iterations=100)
 
 
-def apply_pontryagin(
+def solve_pontryagin(
     problem: ContinuousProblem, guess: MethodMotion, method: str, tolerance: float = TOLERANCE
 ) -> Resumable[MethodMotion]:
     """By "collocation" or "shooting", from the states and costates of a motion."""
@@ -37,7 +37,7 @@ def motion_of_extremal(problem: ContinuousProblem, found: Extremal) -> MethodMot
     motion = no_motion(problem)
     if not found.converged:
         return replace(motion, iterations=found.iterations, message=found.stopped)
-    found = indirect.at_times(found, problem, motion.t)
+    found = indirect.resample_extremal(found, problem, motion.t)
     return replace(
         motion,
         X=found.X,
@@ -52,7 +52,7 @@ def motion_of_extremal(problem: ContinuousProblem, found: Extremal) -> MethodMot
     )
 
 
-def optimise_directly(
+def solve_direct(
     problem: ContinuousProblem, guess: MethodMotion, N: int
 ) -> Iterator[MethodMotion | None]:
     """By trapezoidal collocation in N steps, from the states and controls of a motion: after each
@@ -63,7 +63,7 @@ def optimise_directly(
     U = np.interp(t, guess.t, guess.U)[:, None]
     at = sqp.init(program, program.variables(X, U[:-1]), OPTIONS)
     while not at.stopped:
-        at = yield from sqp.step_in_pieces(program, OPTIONS, at)
+        at = yield from sqp.resumable_step(program, OPTIONS, at)
         yield motion_of_iterate(problem, program, at)
     if not at.iteration:
         yield motion_of_iterate(problem, program, at)

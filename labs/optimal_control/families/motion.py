@@ -43,7 +43,7 @@ class MethodMotion:
         return float(np.interp(t, self.t, self.U))
 
 
-def instants(T: float, start: float = 0.0) -> np.ndarray:
+def time_grid(T: float, start: float = 0.0) -> np.ndarray:
     """From `start` for T [s]."""
     return start + np.linspace(0.0, T, SAMPLES + 1)
 
@@ -52,18 +52,18 @@ def no_motion(problem: ContinuousProblem) -> MethodMotion:
     """Before anything is found: at rest in x_0."""
     still = np.zeros(SAMPLES + 1)
     X = np.tile(problem.x0, (SAMPLES + 1, 1))
-    return MethodMotion(instants(problem.T), X, still, np.zeros_like(X))
+    return MethodMotion(time_grid(problem.T), X, still, np.zeros_like(X))
 
 
-def resample(motion: MethodMotion, T: float) -> MethodMotion:
+def stretch_motion(motion: MethodMotion, T: float) -> MethodMotion:
     """The same, stretched to T [s]."""
-    return replace(motion, t=instants(T))
+    return replace(motion, t=time_grid(T))
 
 
 def first_guess(problem: ContinuousProblem, swing: float) -> MethodMotion:
     """From q_0 to 0 and to rest, and on the way out by about `swing` and back; the control that
     this takes, within its limits, and the costates for which that control would minimise H."""
-    t = instants(problem.T)
+    t = time_grid(problem.T)
     s = t / problem.T
     q = problem.x0[0] * (1.0 - s) ** 2 * (1.0 + 2.0 * s)
     q = q + 4.0 * swing * s * (1.0 - s) * np.sin(2.0 * np.pi * s)

@@ -13,7 +13,7 @@ import numpy as np
 
 from labs.colors import sequential
 from labs.models.mass_on_a_line import mass_on_a_line
-from labs.models.pendulums import hanging
+from labs.models.pendulums import pendulum_arm
 from labs.optimal_control.families.motion import MethodMotion
 from labs.optimal_control.families.params import FamiliesParams
 from labs.optimal_control.families.side_by_side import FAMILY_NAMES, Results
@@ -81,7 +81,7 @@ HINGE = -0.85
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class CostToGoSurface:
     """V over the plane of states, to draw and to put states on."""
 
     params: FamiliesParams
@@ -91,7 +91,7 @@ class Surface:
     """(q, v) in [0, 1)."""
 
     @classmethod
-    def of(cls, params: FamiliesParams, at: Results) -> "Surface":
+    def of(cls, params: FamiliesParams, at: Results) -> "CostToGoSurface":
         """What is known of V."""
         V = at.values[params.surface]
         costs = [motion.cost for motion in at.motions.values() if motion.known]
@@ -107,11 +107,13 @@ class Surface:
     @cached_property
     def points(self) -> np.ndarray:
         """(q, v, 3) [m]"""
-        points = floor(self.params, np.stack(np.meshgrid(self.q, self.v, indexing="ij"), axis=-1))
+        points = floor_points(
+            self.params, np.stack(np.meshgrid(self.q, self.v, indexing="ij"), axis=-1)
+        )
         points[..., 2] += LAYOUTS[self.params.system].height * self.heights
         return points
 
-    def lift(self, X: np.ndarray) -> np.ndarray:
+    def on_surface(self, X: np.ndarray) -> np.ndarray:
         """(k, 3) [m]: states X (k, 2) on the surface."""
         points = self.points
         axes = zip((self.q, self.v), X.T, strict=True)
@@ -133,7 +135,7 @@ def draw_bodies(scene: Scene, params: FamiliesParams, at: Results, now: float) -
         x, q = layout.first - layout.spacing * i, motion.at(now)[:1]
         if params.system == "pendulum":
             body, q, label = (
-                hanging(1, (x, HINGE), BODIES[name]),
+                pendulum_arm(1, (x, HINGE), BODIES[name]),
                 q + np.pi,
                 (x, HINGE + 0.14, 0.78),
             )
@@ -145,44 +147,44 @@ def draw_bodies(scene: Scene, params: FamiliesParams, at: Results, now: float) -
 
 def draw_values(scene: Scene, params: FamiliesParams, at: Results, now: float) -> None:
     """The surface, the motions on it, the state to start from, and the tail from M."""
-    surface = Surface.of(params, at)
+    surface = CostToGoSurface.of(params, at)
     scene.surface("surface", surface.points, sequential(surface.heights, 0.0, 0.9))
     for name, motion in reversed(list(at.motions.items())):
         if motion.known:
-            scene.trail(f"path of {name}", surface.lift(motion.X), COLORS[name])
-            place = surface.lift(motion.at(now)[None])[0]
+            scene.trail(f"path of {name}", surface.on_surface(motion.X), COLORS[name])
+            place = surface.on_surface(motion.at(now)[None])[0]
             scene.sphere(f"state of {name}", place, 0.028, COLORS[name])
     up = np.array([0.0, 0.0, 0.1])
-    scene.handle("start", surface.lift(params.x0[None])[0], 0.04)
+    scene.handle("start", surface.on_surface(params.x0[None])[0], 0.04)
     goal = "upright" if params.system == "pendulum" else "middle"
-    scene.label("goal", goal, surface.lift(np.zeros((1, 2)))[0] + up)
+    scene.label("goal", goal, surface.on_surface(np.zeros((1, 2)))[0] + up)
     _draw_tail(scene, surface, at.tail if params.moment else None)
 
 
-def _draw_tail(scene: Scene, surface: Surface, tail: MethodMotion | None) -> None:
+def _draw_tail(scene: Scene, surface: CostToGoSurface, tail: MethodMotion | None) -> None:
     if tail and tail.converged:
-        path = surface.lift(tail.X) + ABOVE
+        path = surface.on_surface(tail.X) + ABOVE
         scene.trail("tail", path, "warning")
         scene.label("moment", "M", path[0] + np.array([0.0, 0.0, 0.1]))
 
 
-def floor(params: FamiliesParams, X: np.ndarray) -> np.ndarray:
+def floor_points(params: FamiliesParams, X: np.ndarray) -> np.ndarray:
     """(..., 3) [m]: where states X (..., 2) are on the floor, cut to the window shown."""
     layout = LAYOUTS[params.system]
-    middle, scale = _map(params)
+    middle, scale = _floor_scale(params)
     y, x = np.moveaxis((np.clip(X, *layout.window) - middle) * scale, -1, 0)
     return np.stack([x, y, np.zeros_like(x)], axis=-1) + layout.center
 
 
 def state_at(params: FamiliesParams, point: tuple[float, float, float]) -> tuple[float, float]:
     """q and v of a point over the floor: the inverse of `floor`."""
-    middle, scale = _map(params)
+    middle, scale = _floor_scale(params)
     x, y, _ = LAYOUTS[params.system].center
     q, v = middle + np.array([point[1] - y, point[0] - x]) / scale
     return float(q), float(v)
 
 
-def _map(params: FamiliesParams) -> tuple[np.ndarray, np.ndarray]:
+def _floor_scale(params: FamiliesParams) -> tuple[np.ndarray, np.ndarray]:
     """The state in the middle of the window, and metres along y and x for each unit of q and v."""
     layout = LAYOUTS[params.system]
     lower, upper = (np.array(corner) for corner in layout.window)

@@ -7,14 +7,19 @@ import numpy as np
 from labs.optimal_control.families.closed_form import closed_form
 from labs.optimal_control.families.motion import first_guess
 from labs.optimal_control.families.params import FamiliesParams
-from labs.optimal_control.families.side_by_side import FAMILY_NAMES, GLOBAL, Results, reference
+from labs.optimal_control.families.side_by_side import (
+    FAMILY_NAMES,
+    GLOBAL_METHODS,
+    Results,
+    optimal_motion,
+)
 from labs.plots import Bars, Curves, HeatMap, Note, Plot, Readout, Trace
 
 SERIES = {"hjb": 1, "dp": 2, "pontryagin": 4, "direct": 7}
 """Colours of the methods."""
-CELLS = 61
+MAX_CELLS = 61
 """Of a heat map along one side, at most."""
-DEAR = 4.0
+CUTOFF_FACTOR = 4.0
 """Times the least cost from the start, where the map ends."""
 
 
@@ -91,10 +96,10 @@ PLOTS: tuple[Plot, ...] = (
 def motion_fields(params: FamiliesParams, at: Results, now: float) -> dict[str, np.ndarray]:
     """The motions and costates known so far, and where they are at t = now [s]."""
     fields: dict[str, np.ndarray] = {}
-    optimal = reference(params, at.motions)
+    optimal = optimal_motion(params, at.motions)
     for name, motion in at.motions.items():
         some = slice(None if motion.known else 0)
-        P = at.gradients[name] if name in GLOBAL and at.over and optimal else motion.P
+        P = at.gradients[name] if name in GLOBAL_METHODS and at.over and optimal else motion.P
         fields[f"t_{name}"], fields[f"u_{name}"] = motion.t[some], motion.U[some]
         fields[f"q_{name}"], fields[f"v_{name}"] = motion.X[some].T
         fields[f"p_q_{name}"], fields[f"p_v_{name}"] = P[some].T
@@ -119,9 +124,9 @@ def table_fields(params: FamiliesParams, at: Results) -> dict[str, np.ndarray]:
     """V as a map, of not too many cells, cut where it is far dearer than the start."""
     V = at.values[params.surface]
     costs = [motion.cost for motion in at.motions.values() if motion.known]
-    V = np.minimum(V, DEAR * min(costs)) if costs else V
+    V = np.minimum(V, CUTOFF_FACTOR * min(costs)) if costs else V
     q, v = params.grid(len(V)).axes
-    every = -(-len(V) // CELLS)
+    every = -(-len(V) // MAX_CELLS)
     return {"across": q[::every], "up": v[::every], "V": V[::every, ::every].T}
 
 
@@ -131,7 +136,7 @@ def study_fields(
     """Costs and times of the four, and the points of the study so far."""
     costs = [motion.cost if motion.known else np.nan for motion in at.motions.values()]
     promises = [
-        motion.promised if motion.known and name in GLOBAL else np.nan
+        motion.promised if motion.known and name in GLOBAL_METHODS else np.nan
         for name, motion in at.motions.items()
     ]
     fields = {
@@ -150,7 +155,7 @@ def study_fields(
     return fields
 
 
-def account(at: Results) -> str:
+def method_notes(at: Results) -> str:
     """What each has found, a line a method."""
     lines = []
     for name, motion in at.motions.items():

@@ -11,17 +11,22 @@ import numpy as np
 
 from labs.algorithms import hjb
 from labs.optimal_control.families.closed_form import closed_form
-from labs.optimal_control.families.comparison import gap, tail_gaps
+from labs.optimal_control.families.comparison import relative_difference, tail_gaps
 from labs.optimal_control.families.global_methods import (
     CostToGoTable,
     PartialTable,
+    compute_table,
     final_values,
     follow_gradient,
     follow_table,
-    make_table,
 )
-from labs.optimal_control.families.local_methods import apply_pontryagin, optimise_directly
-from labs.optimal_control.families.motion import MethodMotion, first_guess, no_motion, resample
+from labs.optimal_control.families.local_methods import solve_direct, solve_pontryagin
+from labs.optimal_control.families.motion import (
+    MethodMotion,
+    first_guess,
+    no_motion,
+    stretch_motion,
+)
 from labs.optimal_control.families.params import FamiliesParams
 from labs.optimal_control.families.study import MethodComparison, no_study, run_study
 from labs.resumable import Resumable, timed
@@ -29,10 +34,10 @@ from labs.resumable import Resumable, timed
 FAMILY_NAMES = {"hjb": "HJB", "dp": "DP", "pontryagin": "Pontryagin", "direct": "Direct"}
 """Their names: Hamilton-Jacobi-Bellman, dynamic programming, Pontryagin's minimum principle, and
 collocation as the direct method."""
-GLOBAL = ("hjb", "dp")
-GAPS = ("gradient_gap", "multiplier_gap", "tail_gap", "tail_cost_gap")
-UNKNOWN = -1.0
-SWINGS = (0.0, 1.0)
+GLOBAL_METHODS = ("hjb", "dp")
+GAP_NAMES = ("gradient_gap", "multiplier_gap", "tail_gap", "tail_cost_gap")
+UNKNOWN_GAP = -1.0
+TAIL_SWINGS = (0.0, 1.0)
 """Of first guesses of a tail, besides the one that is set."""
 
 
@@ -53,7 +58,7 @@ class Results:
     study: MethodComparison
     gaps: Mapping[str, float]
     """How close the answers are [%]: of V's gradient and of the multipliers to the costate, of the
-    tail to the motion and of its cost to the rest of J; UNKNOWN, where they are."""
+    tail to the motion and of its cost to the rest of J; UNKNOWN_GAP, where they are."""
     over: bool = False
 
 
@@ -65,15 +70,17 @@ def no_results(params: FamiliesParams) -> Results:
     return Results(
         motions=dict.fromkeys(FAMILY_NAMES, still),
         progress=dict.fromkeys(FAMILY_NAMES, 0.0),
-        values=dict.fromkeys(GLOBAL, values),
-        gradients={name: np.zeros_like(still.P) for name in GLOBAL},
+        values=dict.fromkeys(GLOBAL_METHODS, values),
+        gradients={name: np.zeros_like(still.P) for name in GLOBAL_METHODS},
         tail=still,
         study=no_study(),
-        gaps=dict.fromkeys(GAPS, UNKNOWN),
+        gaps=dict.fromkeys(GAP_NAMES, UNKNOWN_GAP),
     )
 
 
-def reference(params: FamiliesParams, motions: Mapping[str, MethodMotion]) -> MethodMotion | None:
+def optimal_motion(
+    params: FamiliesParams, motions: Mapping[str, MethodMotion]
+) -> MethodMotion | None:
     """The optimal motion to measure by: in closed form, or the cheaper of what the local methods
     have converged to, Pontryagin's where they agree."""
     exact = closed_form(params, params.x0, params.horizon)
@@ -98,14 +105,14 @@ def solve_side_by_side(
 
     def start(name: str) -> MethodMotion:
         warm = params.start == "warm" and before[name].converged
-        return resample(before[name], params.horizon) if warm else guess
+        return stretch_motion(before[name], params.horizon) if warm else guess
 
     nodes = round(params.nodes)
     work: dict[str, Iterator[PartialTable | MethodMotion | None]] = {
-        "hjb": make_table(params, "hjb", nodes),
-        "dp": make_table(params, "dp", nodes),
+        "hjb": compute_table(params, "hjb", nodes),
+        "dp": compute_table(params, "dp", nodes),
         "pontryagin": _pontryagin(params, start("pontryagin")),
-        "direct": optimise_directly(problem, start("direct"), round(params.intervals)),
+        "direct": solve_direct(problem, start("direct"), round(params.intervals)),
     }
     while work:
         for name in list(work):
@@ -119,22 +126,26 @@ def solve_side_by_side(
             seconds[name] += perf_counter() - begun
             if share == "end":
                 del work[name]
-                at = _with(at, "progress", name, 1.0)
+                at = _with_entry(at, "progress", name, 1.0)
             elif isinstance(share, MethodMotion):
-                at = _with(at, "motions", name, share)
+                at = _with_entry(at, "motions", name, share)
             elif isinstance(share, PartialTable):
-                at = _with(_with(at, "values", name, share.V), "progress", name, share.progress)
+                at = _with_entry(
+                    _with_entry(at, "values", name, share.V), "progress", name, share.progress
+                )
                 if share.table:
                     tables[name] = share.table
                     seconds[name] = share.table.seconds
                     yield None
-                    motion = yield from timed(_follow(params, name, share.table), seconds, name)
-                    at = _with(at, "motions", name, motion)
+                    motion = yield from timed(
+                        _follow_policy(params, name, share.table), seconds, name
+                    )
+                    at = _with_entry(at, "motions", name, motion)
         yield at
     moment = params.moment * params.horizon
     slices = {name: table.slice_at(moment) for name, table in tables.items()}
     at = replace(at, values=slices)
-    optimal = reference(params, at.motions)
+    optimal = optimal_motion(params, at.motions)
     if optimal:
         along = {}
         for name, table in tables.items():
@@ -151,16 +162,16 @@ def solve_side_by_side(
     yield replace(at, over=True)
 
 
-def _with(at: Results, field: str, name: str, value: object) -> Results:
+def _with_entry(at: Results, field: str, name: str, value: object) -> Results:
     changed: dict[str, Any] = {field: {**getattr(at, field), name: value}}
     return replace(at, **changed)
 
 
 def _gaps(params: FamiliesParams, at: Results, optimal: MethodMotion) -> dict[str, float]:
-    found = {"gradient_gap": gap(at.gradients["hjb"], optimal.P)}
+    found = {"gradient_gap": relative_difference(at.gradients["hjb"], optimal.P)}
     direct = at.motions["direct"]
     if direct.converged and direct is not optimal:
-        found["multiplier_gap"] = gap(direct.P, optimal.P)
+        found["multiplier_gap"] = relative_difference(direct.P, optimal.P)
     if at.tail.converged:
         found |= tail_gaps(params, optimal, at.tail)
     return found
@@ -168,14 +179,16 @@ def _gaps(params: FamiliesParams, at: Results, optimal: MethodMotion) -> dict[st
 
 def _pontryagin(params: FamiliesParams, guess: MethodMotion) -> Iterator[MethodMotion | None]:
     problem = params.problem(params.x0, params.horizon)
-    yield (yield from apply_pontryagin(problem, guess, params.pontryagin))
+    yield (yield from solve_pontryagin(problem, guess, params.pontryagin))
 
 
-def _follow(params: FamiliesParams, name: str, table: CostToGoTable) -> Resumable[MethodMotion]:
+def _follow_policy(
+    params: FamiliesParams, name: str, table: CostToGoTable
+) -> Resumable[MethodMotion]:
     problem = params.problem(params.x0, params.horizon)
     if name == "hjb":
         return follow_gradient(problem, table)
-    return follow_table(problem, table, hjb.controls(problem, round(params.levels)))
+    return follow_table(problem, table, hjb.control_levels(problem, round(params.levels)))
 
 
 def _solve_tail(params: FamiliesParams, optimal: MethodMotion) -> Resumable[MethodMotion]:
@@ -184,8 +197,8 @@ def _solve_tail(params: FamiliesParams, optimal: MethodMotion) -> Resumable[Meth
     begin = params.moment * params.horizon
     problem = params.problem(optimal.at(begin), params.horizon - begin)
     best = no_motion(problem)
-    for swing in dict.fromkeys((params.guess, *SWINGS)) if begin else ():
-        found = yield from apply_pontryagin(problem, first_guess(problem, swing), "collocation")
+    for swing in dict.fromkeys((params.guess, *TAIL_SWINGS)) if begin else ():
+        found = yield from solve_pontryagin(problem, first_guess(problem, swing), "collocation")
         if found.converged and not (best.converged and best.cost < found.cost):
             best = found
     return replace(best, t=best.t + begin)

@@ -6,16 +6,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labs.optimal_control.families.global_methods import CostToGoTable, make_table
-from labs.optimal_control.families.local_methods import apply_pontryagin, optimise_directly
+from labs.optimal_control.families.global_methods import CostToGoTable, compute_table
+from labs.optimal_control.families.local_methods import solve_direct, solve_pontryagin
 from labs.optimal_control.families.motion import MethodMotion, first_guess
 from labs.optimal_control.families.params import FamiliesParams
 from labs.optimal_control.families.tables import nearest_node
 from labs.resumable import Resumable
 
-NODES = (21, 31, 41, 61, 81, 121, 161)
-SWINGS = np.linspace(-4.0, 4.0, 17)
-ROUGH = 1e-3
+GRID_NODES = (21, 31, 41, 61, 81, 121, 161)
+GUESS_SWINGS = np.linspace(-4.0, 4.0, 17)
+ROUGH_TOLERANCE = 1e-3
 """The tolerance that is enough to tell minima apart."""
 
 
@@ -34,12 +34,12 @@ class MethodComparison:
 
     def progress(self, study: str) -> float:
         """The part of a study that is done."""
-        return self.count / len(NODES if study == "grid" else SWINGS)
+        return self.count / len(GRID_NODES if study == "grid" else GUESS_SWINGS)
 
 
 def no_study() -> MethodComparison:
     """Before the first result."""
-    shape = (len(SWINGS), 2)
+    shape = (len(GUESS_SWINGS), 2)
     return MethodComparison(np.zeros(shape[0]), np.zeros(shape), np.zeros(shape, bool))
 
 
@@ -48,18 +48,18 @@ def run_study(params: FamiliesParams, optimal: MethodMotion) -> Iterator[MethodC
     counted from the cost of the `optimal` motion."""
     at = no_study()
     if params.study == "grid":
-        for i, nodes in enumerate(NODES):
+        for i, nodes in enumerate(GRID_NODES):
             errors = yield from _errors_of_grids(params, nodes, optimal)
-            at = _with(at, i, nodes, errors, np.array([True, True]))
+            at = _with_point(at, i, nodes, errors, np.array([True, True]))
             yield at
     if params.study == "guess":
-        for i, swing in enumerate(SWINGS):
+        for i, swing in enumerate(GUESS_SWINGS):
             costs, found = yield from _costs_of_guess(params, swing)
-            at = _with(at, i, swing, costs, found)
+            at = _with_point(at, i, swing, costs, found)
             yield at
 
 
-def _with(
+def _with_point(
     at: MethodComparison, i: int, x: float, y: np.ndarray, found: np.ndarray
 ) -> MethodComparison:
     new = replace(at, x=at.x.copy(), y=at.y.copy(), found=at.found.copy(), count=i + 1)
@@ -73,7 +73,7 @@ def _errors_of_grids(
     promised = []
     for method in ("hjb", "dp"):
         table: CostToGoTable | None = None
-        for part in make_table(params, method, nodes):
+        for part in compute_table(params, method, nodes):
             yield None
             table = part.table if part else table
         assert table is not None
@@ -93,9 +93,9 @@ def _costs_of_guess(
 ) -> Resumable[tuple[np.ndarray, np.ndarray]]:
     problem = params.problem(params.x0, params.horizon)
     guess = first_guess(problem, swing)
-    motion = yield from apply_pontryagin(problem, guess, "collocation", ROUGH)
+    motion = yield from solve_pontryagin(problem, guess, "collocation", ROUGH_TOLERANCE)
     motions = [motion]
-    for found in optimise_directly(problem, guess, round(params.intervals)):
+    for found in solve_direct(problem, guess, round(params.intervals)):
         if found:
             motion = found
         yield None

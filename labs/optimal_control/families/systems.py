@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labs.models.mass_on_a_line import MASS as BLOCK
-from labs.models.pendulums import LENGTH, MASS, RADIUS
+from labs.models.mass_on_a_line import BLOCK_MASS as BLOCK
+from labs.models.pendulums import ROD_LENGTH, ROD_MASS, ROD_RADIUS
 
 GRAVITY = 9.81
 """[m/s^2]"""
-INERTIA = MASS * (LENGTH**2 / 3.0 + RADIUS**2 / 4.0)
+INERTIA = ROD_MASS * (ROD_LENGTH**2 / 3.0 + ROD_RADIUS**2 / 4.0)
 """I [kg m^2] of the rod about its hinge."""
-TORQUE_LEVEL = MASS * GRAVITY * LENGTH / 2.0
+TORQUE_LEVEL = ROD_MASS * GRAVITY * ROD_LENGTH / 2.0
 """m g l [N m], what holds the rod level."""
 
 

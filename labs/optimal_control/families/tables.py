@@ -45,7 +45,7 @@ def nearest_node(grid: StateGrid, X: np.ndarray) -> np.ndarray:
     return np.asarray(i * grid.shape[1] + j, dtype=np.int32)
 
 
-def tabulate(
+def discretize_to_mdp(
     problem: ContinuousProblem, grid: StateGrid, dt: float, levels: np.ndarray
 ) -> Resumable[FiniteMDP]:
     """The MDP of steps of dt and these controls (U,). Pauses after each of them."""

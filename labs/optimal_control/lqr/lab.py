@@ -11,9 +11,9 @@ from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.models.plant import Force
 from labs.optimal_control.lqr.comparison import COMPARED_HORIZONS, HORIZON_COUNT, compare
 from labs.optimal_control.lqr.linear_systems import SIMULATION_STEP, LinearSystem
-from labs.optimal_control.lqr.own_system import OwnSystem, advance
+from labs.optimal_control.lqr.own_system import OwnSystem, step_own_system
 from labs.optimal_control.lqr.params import LqrParams
-from labs.optimal_control.lqr.picture import clip_norm, draw_regulated, draw_states
+from labs.optimal_control.lqr.picture import clip_norm, draw_regulated, draw_state_components
 from labs.optimal_control.lqr.plots import (
     PLOTS,
     closed_loop_fields,
@@ -30,9 +30,9 @@ from labs.scene import Scene
 
 PUSH_STEPS = 20
 """World steps a push lasts: 0.2 s."""
-TRAIL = 200
+PATH_POINTS = 200
 """World steps of the path that is shown: 2 s."""
-ROUNDS = 3
+TIMING_ROUNDS = 3
 """Of the comparison with least squares; the shortest duration of each horizon counts."""
 ADVICE = "The policy knows of no limits: start closer, push less, or weigh otherwise; then reset."
 
@@ -63,7 +63,7 @@ class LqrState(State):
     """V_t(x_t), what the policy expected to pay from it on."""
     predicted_cost: float = 0.0
     """V_0(x_0) when the account was opened."""
-    account: str = ""
+    cost_settings: str = ""
     """The settings it was opened for; empty when the next update opens another."""
     path: np.ndarray
     """(k, 2) the newest last: coordinate and rate in the phase plane, [rad; m]."""
@@ -146,7 +146,7 @@ class Lqr(Lab[LqrParams, LqrState]):
         elif state.since_update + 1 < length:
             x = state.x
         else:
-            x = advance(regulator.problem, state.x, state.u, force)
+            x = step_own_system(regulator.problem, state.x, state.u, force)
         count = state.steps + 1
         if why := system.out_of_range(x):
             return replace(state, trouble=f"At t = {state.t:.2f} s {why}. {ADVICE}")
@@ -158,8 +158,8 @@ class Lqr(Lab[LqrParams, LqrState]):
             x=x,
             force=_force_on_tip(system, x, force),
             push_left=max(push_left - 1, 0),
-            account="" if force else state.account,
-            path=np.vstack([state.path[-TRAIL + 1 :], system.phase_point(x)]),
+            cost_settings="" if force else state.cost_settings,
+            path=np.vstack([state.path[-PATH_POINTS + 1 :], system.phase_point(x)]),
         )
 
     def _update_control(self, params: LqrParams, regulator: Regulator, state: LqrState) -> LqrState:
@@ -167,7 +167,7 @@ class Lqr(Lab[LqrParams, LqrState]):
         settings, the end of a push and the start of a window open a new one."""
         system, dx = regulator.system, state.x - regulator.system.x_eq
         account = repr(regulator.settings)
-        changed = state.account != account
+        changed = state.cost_settings != account
         index = 0 if changed else (state.index + 1) % len(regulator.gains)
         opened = changed or (index == 0 and params.policy == "window")
         du = regulator.gains[index] @ dx
@@ -184,7 +184,7 @@ class Lqr(Lab[LqrParams, LqrState]):
             stage_cost=regulator.cost(dx, du),
             cost_to_go=value,
             predicted_cost=value if opened else state.predicted_cost,
-            account=account,
+            cost_settings=account,
         )
 
     # The solver's clock -----------------------------------------------------------------------
@@ -197,7 +197,7 @@ class Lqr(Lab[LqrParams, LqrState]):
             yield Snapshot(1, done=regulator.trouble)
             return
         rows = GRID_POINTS if params.system in SYSTEM_CODES else 0
-        horizons = ROUNDS * tuple(enumerate(COMPARED_HORIZONS[params.system]))
+        horizons = TIMING_ROUNDS * tuple(enumerate(COMPARED_HORIZONS[params.system]))
         last, count = rows + bool(rows) + len(horizons), 0
         data: dict[str, Any] = {"region": state.region, "largest_recoverable": -1.0}
         data |= {name: np.zeros(HORIZON_COUNT) for name in ("differences", "riccati", "at_once")}
@@ -250,7 +250,10 @@ class Lqr(Lab[LqrParams, LqrState]):
             measured["recursions"] = regulator.steady.iterations
         if state.largest_recoverable >= 0.0:
             measured["lean"] = state.largest_recoverable
-        return measured | {"growth": regulator.growth, "settled": regulator.constant_gains}
+        return measured | {
+            "growth": regulator.spectral_radius,
+            "settled": regulator.constant_gain_count,
+        }
 
     def fields(self, params: LqrParams, state: LqrState) -> Mapping[str, np.ndarray]:
         regulator, system = params.regulator, params.linear_system
@@ -273,7 +276,7 @@ class Lqr(Lab[LqrParams, LqrState]):
     def draw(self, scene: Scene, params: LqrParams, state: LqrState) -> None:
         """The system, a ghost at its rest, and the forces on it."""
         if isinstance(params.linear_system, OwnSystem):
-            draw_states(scene, params.linear_system, state.x)
+            draw_state_components(scene, params.linear_system, state.x)
             return
         draw_regulated(scene, params, state.x, state.u, state.force)
 
@@ -284,9 +287,9 @@ def _summary(regulator: Regulator) -> str:
         return "Studied; there is no steady state to go to."
     if regulator.steady.trouble:
         return regulator.steady.trouble
-    if regulator.mismatch < 0.0:
+    if regulator.riccati_error < 0.0:
         return "Studied. SciPy does not solve this equation."
-    return f"Studied. Recursion and SciPy differ by {regulator.mismatch:.0e} of P's size."
+    return f"Studied. Recursion and SciPy differ by {regulator.riccati_error:.0e} of P's size."
 
 
 def _force_on_tip(

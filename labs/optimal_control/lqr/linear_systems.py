@@ -18,9 +18,9 @@ import numpy as np
 from labs.algorithms.discretisation import repeat_held
 from labs.algorithms.integrators import rk4
 from labs.errors import LabError
-from labs.models.arms import load
-from labs.models.cart_pole import HALF_RAIL
-from labs.models.discrete import Discrete
+from labs.models.arms import load_arm
+from labs.models.cart_pole import HALF_RAIL_LENGTH
+from labs.models.discrete import DiscreteMechanism
 from labs.models.mass_on_a_line import mass_on_a_line
 from labs.models.mechanisms import Mechanism, mechanism
 from labs.models.plant import Force, Plant
@@ -119,15 +119,15 @@ def linear_system(name: str) -> LinearSystem:
     """The system of this name. Raises LabError, listing those there are."""
     match name:
         case "cart-pole":
-            return _at_rest(name, mechanism(name), [0.0, np.pi], (0,), HALF_RAIL, 10.0)
+            return _at_rest(name, mechanism(name), [0.0, np.pi], (0,), HALF_RAIL_LENGTH, 10.0)
         case "pendulum":
             return _at_rest(name, mechanism(name), [np.pi], (), np.inf, 40.0)
         case "mass":
             arm = mass_on_a_line()
             block = Mechanism(name, Plant(arm, arm.model, arm.model.createData()), (0,), 0.0)
-            return _at_rest(name, block, [0.0], (0,), HALF_RAIL, 20.0)
+            return _at_rest(name, block, [0.0], (0,), HALF_RAIL_LENGTH, 20.0)
         case "ur5":
-            home = load(name).home
+            home = load_arm(name).home
             return _at_rest(name, mechanism(name), list(home), (), np.inf, 300.0)
         case _:
             raise LabError(
@@ -144,7 +144,7 @@ def _at_rest(
     pull_stiffness: float,
 ) -> LinearSystem:
     q_eq = np.array(q)
-    x_eq, u_eq = np.concatenate([q_eq, np.zeros(body.nq)]), body.holding(q_eq)
+    x_eq, u_eq = np.concatenate([q_eq, np.zeros(body.nq)]), body.equilibrium_control(q_eq)
     return LinearSystem(name, body, x_eq, u_eq, prismatic, half_rail, pull_stiffness)
 
 
@@ -155,6 +155,6 @@ def _linear(name: str, period: float) -> tuple[np.ndarray, np.ndarray]:
     if steps < 1 or abs(steps * SIMULATION_STEP - period) > 1e-9:
         raise LabError(f"T = {period} s: it takes whole steps of {SIMULATION_STEP} s, one at least")
     system = linear_system(name)
-    one = Discrete(system.mechanism, SIMULATION_STEP, "rk4")
+    one = DiscreteMechanism(system.mechanism, SIMULATION_STEP, "rk4")
     _, a, b = one.linearize(system.x_eq[None], system.u_eq[None])
     return repeat_held(a[0], b[0], steps)

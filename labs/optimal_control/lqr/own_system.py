@@ -21,16 +21,16 @@ import numpy as np
 from labs.algorithms.discretisation import zero_order_hold
 from labs.errors import LabError
 from labs.models.plant import Force
-from labs.number_texts import parse_number, plain_text, shorten
+from labs.number_texts import parse_number, strip_comments, truncate
 from labs.problems.linear_quadratic import LqrProblem
 
-NAMES = ("A", "B", "Q", "R", "x0")
-MOST_STATES, MOST_CONTROLS = 8, 4
-LARGEST = 1e6
+MATRIX_NAMES = ("A", "B", "Q", "R", "x0")
+MAX_STATES, MAX_CONTROLS = 8, 4
+MAX_ENTRY = 1e6
 """Of an entry; and of a state, relative to the largest of x0 or 1, before it is given up."""
-FASTEST = 1e3
+MAX_GROWTH_RATE = 1e3
 """[1/s] Of what grows by itself in continuous time: exp(A T) is to be a number for every T."""
-EXAMPLE = "A = 1 0.1; 0 1\nB = 0.005; 0.1\nQ = diag(10, 1)\nR = 0.1\nx0 = 1 0"
+EXAMPLE_SYSTEM = "A = 1 0.1; 0 1\nB = 0.005; 0.1\nQ = diag(10, 1)\nR = 0.1\nx0 = 1 0"
 """A mass of 1 kg, pushed for 0.1 s a step."""
 
 
@@ -82,11 +82,11 @@ class OwnSystem:
 
     def out_of_range(self, x: np.ndarray) -> str:
         """Why it is followed no further, "it ..."; empty while it is."""
-        most = LARGEST * max(1.0, float(np.abs(self.x0).max()))
+        most = MAX_ENTRY * max(1.0, float(np.abs(self.x0).max()))
         return "" if np.abs(x).max() <= most else f"its state passed {most:g}"
 
 
-def advance(
+def step_own_system(
     problem: LqrProblem, x: np.ndarray, u: np.ndarray, force: Force | None = None
 ) -> np.ndarray:
     """x (n,) one step later under u (m,), to which a push adds its force [N]; A and B of the step
@@ -96,41 +96,45 @@ def advance(
 
 
 @lru_cache(maxsize=32)
-def own_system(text: str, continuous: bool = False) -> OwnSystem:
+def parse_own_system(text: str, continuous: bool = False) -> OwnSystem:
     """The system a text describes. Raises LabError, naming the matrix and what it must be."""
     said = _read_json(text) if text.lstrip()[:1] == "{" else _read_assignments(text)
-    missing = [name for name in NAMES if name not in said]
+    missing = [name for name in MATRIX_NAMES if name not in said]
     if missing:
         raise LabError(f"{', '.join(missing)} missing: A = 1 0.1; 0 1 and so on, each on a line")
     a = said["A"]
     n = len(a)
-    if a.shape != (n, n) or n > MOST_STATES:
-        raise LabError(f"A is {_size(a)}: it is square, {MOST_STATES} x {MOST_STATES} at most")
+    if a.shape != (n, n) or n > MAX_STATES:
+        raise LabError(f"A is {_size_text(a)}: it is square, {MAX_STATES} x {MAX_STATES} at most")
     b = said["B"].T if said["B"].shape == (1, n) and n > 1 else said["B"]
-    if len(b) != n or b.shape[1] > MOST_CONTROLS:
+    if len(b) != n or b.shape[1] > MAX_CONTROLS:
         raise LabError(
-            f"B is {_size(b)}: it has {n} rows as A has, and a column for each of at most "
-            f"{MOST_CONTROLS} controls"
+            f"B is {_size_text(b)}: it has {n} rows as A has, and a column for each of at most "
+            f"{MAX_CONTROLS} controls"
         )
-    q, r = _weight("Q", said["Q"], n, "A"), _weight("R", said["R"], b.shape[1], "B's columns")
+    q, r = (
+        _weight_matrix("Q", said["Q"], n, "A"),
+        _weight_matrix("R", said["R"], b.shape[1], "B's columns"),
+    )
     x0 = said["x0"].ravel()
     if len(x0) != n:
         raise LabError(f"x0 has {len(x0)} numbers: A wants {n}")
     LqrProblem(1, a, b, q, r, q)
-    if continuous and (fastest := float(np.linalg.eigvals(a).real.max())) > FASTEST:
+    if continuous and (fastest := float(np.linalg.eigvals(a).real.max())) > MAX_GROWTH_RATE:
         raise LabError(
-            f"A grows as exp({fastest:g} t): in continuous time exp({FASTEST:g} t) goes at most"
+            f"A grows as exp({fastest:g} t): in continuous time exp({MAX_GROWTH_RATE:g} t) "
+            "goes at most"
         )
     return OwnSystem(a, b, q, r, x0, continuous)
 
 
-def _weight(name: str, given: np.ndarray, n: int, like: str) -> np.ndarray:
+def _weight_matrix(name: str, given: np.ndarray, n: int, like: str) -> np.ndarray:
     if given.shape == (1, 1):
         given = given * np.eye(n)
     if given.shape == (1, n):
         given = np.diag(given[0])
     if given.shape != (n, n):
-        raise LabError(f"{name} is {_size(given)}: it is {n} x {n}, for {like}")
+        raise LabError(f"{name} is {_size_text(given)}: it is {n} x {n}, for {like}")
     return given
 
 
@@ -139,7 +143,10 @@ def _read_json(text: str) -> dict[str, np.ndarray]:
         said = json.loads(text, parse_int=float)
     except (ValueError, RecursionError) as error:
         raise LabError(f"the matrices are not sound JSON: {error}") from None
-    return {_name(name): _matrix(name, _json_rows(name, entry)) for name, entry in said.items()}
+    return {
+        _matrix_name(name): _parse_matrix(name, _json_rows(name, entry))
+        for name, entry in said.items()
+    }
 
 
 def _json_rows(name: str, entry: Any) -> list[list[str]]:
@@ -151,15 +158,15 @@ def _json_rows(name: str, entry: Any) -> list[list[str]]:
 
 
 def _read_assignments(text: str) -> dict[str, np.ndarray]:
-    text = re.sub(r",\s*dtype\s*=\s*[\w.]+", "", plain_text(text))
+    text = re.sub(r",\s*dtype\s*=\s*[\w.]+", "", strip_comments(text))
     parts = re.split(r"(?:^|[\n;,])\s*([A-Za-z]\w*)\s*[=:]", text)
     if parts[0].strip() or len(parts) < 2:
         raise LabError(
-            f"{shorten(parts[0].strip())!r}: each matrix begins with its name, A = 1 0.1; 0 1"
+            f"{truncate(parts[0].strip())!r}: each matrix begins with its name, A = 1 0.1; 0 1"
         )
     said: dict[str, np.ndarray] = {}
     for name, entry in zip(parts[1::2], parts[2::2], strict=True):
-        said[_name(name)] = _matrix(name, *_text_rows(name, entry))
+        said[_matrix_name(name)] = _parse_matrix(name, *_text_rows(name, entry))
     return said
 
 
@@ -170,7 +177,7 @@ def _text_rows(name: str, entry: str) -> tuple[list[list[str]], bool]:
     entry = re.sub(r"\b(?:block_)?diag\b", "", entry)
     if call := re.search(r"[^\W\d]\w*\s*\(", entry):
         raise LabError(
-            f"{name}: {shorten(call[0])}...) is not worked out: write the numbers row by row, or "
+            f"{name}: {truncate(call[0])}...) is not worked out: write the numbers row by row, or "
             "diag(1, 2); a single number of Q or R stands for so many times the unit matrix"
         )
     entry = re.sub(r"\]\s*,?\s*\[", ";", entry)
@@ -179,7 +186,7 @@ def _text_rows(name: str, entry: str) -> tuple[list[list[str]], bool]:
     return [row for row in split if any(row)], diagonal
 
 
-def _matrix(name: str, rows: list[list[str]], diagonal: bool = False) -> np.ndarray:
+def _parse_matrix(name: str, rows: list[list[str]], diagonal: bool = False) -> np.ndarray:
     widths = {len(row) for row in rows}
     if len(widths) != 1 or not any(rows):
         sizes = ", ".join(str(len(row)) for row in rows if row) or "no"
@@ -188,17 +195,17 @@ def _matrix(name: str, rows: list[list[str]], diagonal: bool = False) -> np.ndar
         found = np.array([[parse_number(number) for number in row] for row in rows])
     except ValueError as error:
         raise LabError(f"{name}: {error}") from None
-    if np.abs(found).max() > LARGEST:
-        raise LabError(f"{name} holds {np.abs(found).max():g}: numbers up to {LARGEST:g} go")
+    if np.abs(found).max() > MAX_ENTRY:
+        raise LabError(f"{name} holds {np.abs(found).max():g}: numbers up to {MAX_ENTRY:g} go")
     return np.diag(found.ravel()) if diagonal else found
 
 
-def _name(name: str) -> str:
-    meant = {known.lower(): known for known in NAMES} | {"x_0": "x0", "x": "x0"}
+def _matrix_name(name: str) -> str:
+    meant = {known.lower(): known for known in MATRIX_NAMES} | {"x_0": "x0", "x": "x0"}
     if name.lower() not in meant:
-        raise LabError(f"{name}? There are {', '.join(NAMES)}")
+        raise LabError(f"{name}? There are {', '.join(MATRIX_NAMES)}")
     return meant[name.lower()]
 
 
-def _size(matrix: np.ndarray) -> str:
+def _size_text(matrix: np.ndarray) -> str:
     return " x ".join(map(str, matrix.shape))

@@ -6,7 +6,7 @@ from pydantic_core.core_schema import ValidationInfo
 
 from labs.errors import LabError
 from labs.optimal_control.lqr.linear_systems import LINEAR_SYSTEMS, LinearSystem
-from labs.optimal_control.lqr.own_system import EXAMPLE, OwnSystem, own_system
+from labs.optimal_control.lqr.own_system import EXAMPLE_SYSTEM, OwnSystem, parse_own_system
 from labs.optimal_control.lqr.region_of_attraction import RegulatedSystem
 from labs.optimal_control.lqr.regulator import (
     FINAL_WEIGHTS,
@@ -40,7 +40,7 @@ class LqrParams(Params):
     """What is to be kept at rest."""
     time: str = SYSTEM.choice("discrete", TIMES, "A and B are in", when=OWN)
     """Continuous time is made discrete with the control held for a time step."""
-    matrices: str = SYSTEM.text(EXAMPLE, "Your matrices", rows=6, max_length=6000, when=OWN)
+    matrices: str = SYSTEM.text(EXAMPLE_SYSTEM, "Your matrices", rows=6, max_length=6000, when=OWN)
     """A, B, Q, R and x0, each after its name, rows after one another with semicolons or on lines of
     their own; or as JSON; pasted or a file. Up to 8 states and 4 controls."""
     deviation: float = SYSTEM.knob(
@@ -128,7 +128,7 @@ class LqrParams(Params):
     @classmethod
     def _are_matrices(cls, value: str, info: ValidationInfo) -> str:
         try:
-            own_system(value, info.data.get("time") == "continuous")
+            parse_own_system(value, info.data.get("time") == "continuous")
         except LabError as error:
             raise ValueError(str(error)) from None
         return value

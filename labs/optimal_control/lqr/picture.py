@@ -29,15 +29,15 @@ def draw_regulated(
     tip = mechanism.tip(q)
     scene.handle("pull", tip + FRONT if params.system == "mass" else tip, 0.05)
     if force.any():
-        scene.arrow("force", tip, tip + _arrow(force))
+        scene.arrow("force", tip, tip + _force_arrow(force))
     if params.system in ("cart-pole", "mass"):
         start = np.array([0.0, q[0], tip[2] if params.system == "mass" else arm.camera[1][2]])
-        push = _arrow(np.array([0.0, u[0], 0.0]))
+        push = _force_arrow(np.array([0.0, u[0], 0.0]))
         if np.abs(push).max() > 1e-3:
             scene.arrow("control", start, start + push, "actual")
 
 
-def draw_states(scene: Scene, system: OwnSystem, x: np.ndarray) -> None:
+def draw_state_components(scene: Scene, system: OwnSystem, x: np.ndarray) -> None:
     """A bead for each number of x on a rail of its own, a muted one at 0; half the rail is the
     largest number of x0."""
     scene.camera((2.2, 0.0, 1.0), (0.0, 0.0, 0.45))
@@ -58,6 +58,6 @@ def clip_norm(vector: np.ndarray, longest: float) -> np.ndarray:
     return vector if length <= longest else vector * (longest / length)
 
 
-def _arrow(force: np.ndarray) -> np.ndarray:
+def _force_arrow(force: np.ndarray) -> np.ndarray:
     """[m] the arrow of a force (3,) [N]."""
     return clip_norm(ARROW_SCALE * force, LONGEST_ARROW)

@@ -9,7 +9,7 @@ from labs.optimal_control.lqr.comparison import COMPARED_HORIZONS, HORIZON_COUNT
 from labs.optimal_control.lqr.linear_systems import LINEAR_SYSTEMS, LinearSystem
 from labs.optimal_control.lqr.own_system import OwnSystem
 from labs.optimal_control.lqr.region_of_attraction import HALF_WIDTHS, SYSTEM_CODES, grid_axes
-from labs.optimal_control.lqr.regulator import Regulator, last_settled
+from labs.optimal_control.lqr.regulator import Regulator, settling_step
 from labs.plots import Curves, Line, Matrix, Plot, Readout, TimeSeries, Trace
 
 MECHANISM = {"system": tuple(LINEAR_SYSTEMS)}
@@ -157,7 +157,7 @@ def recursion_fields(regulator: Regulator) -> dict[str, np.ndarray]:
     """How P_t and K_t come to rest, with a mark where they are constant."""
     fields: dict[str, np.ndarray] = {}
     for name, shares in zip("pk", regulator.relative_to_steady(), strict=True):
-        mark = last_settled(shares)
+        mark = settling_step(shares)
         span = np.array([shares.min(initial=1.0), shares.max(initial=1.0)])
         fields |= {
             f"{name}_steps": np.arange(len(shares), dtype=float),

@@ -89,7 +89,7 @@ class RegulatedSystem:
         starts = np.ascontiguousarray(deviations, float)
         recovered = np.zeros(len(starts), np.bool_)
         if level > 0.0:
-            _simulate(
+            _roll_out(
                 SYSTEM_CODES[self.system],
                 starts,
                 system.x_eq,
@@ -154,16 +154,16 @@ def _state_derivative(code: int, x: np.ndarray, u: float, dx: np.ndarray) -> Non
     for i in range(n):
         dx[i] = x[n + i]
     if code == 0:
-        dx[1] = u / mass_on_a_line.MASS
+        dx[1] = u / mass_on_a_line.BLOCK_MASS
     elif code == 1:
-        m, length, radius = pendulums.MASS, pendulums.LENGTH, pendulums.RADIUS
+        m, length, radius = pendulums.ROD_MASS, pendulums.ROD_LENGTH, pendulums.ROD_RADIUS
         inertia = m * (3.0 * radius**2 + 4.0 * length**2) / 12.0
         dx[1] = (u - m * GRAVITY * 0.5 * length * np.sin(x[0])) / inertia
     else:
-        m, half, radius = cart_pole.POLE, 0.5 * cart_pole.LENGTH, cart_pole.RADIUS
+        m, half, radius = cart_pole.POLE_MASS, 0.5 * cart_pole.POLE_LENGTH, cart_pole.POLE_RADIUS
         inertia = m * (3.0 * radius**2 + 16.0 * half**2) / 12.0
         sine, cosine = np.sin(x[1]), np.cos(x[1])
-        total, coupling = cart_pole.CART + m, m * half * cosine
+        total, coupling = cart_pole.CART_MASS + m, m * half * cosine
         right = u + m * half * x[3] ** 2 * sine
         down = -m * GRAVITY * half * sine
         determinant = total * inertia - coupling**2
@@ -172,7 +172,7 @@ def _state_derivative(code: int, x: np.ndarray, u: float, dx: np.ndarray) -> Non
 
 
 @compiled
-def _simulate(
+def _roll_out(
     code: int,
     starts: np.ndarray,
     x_eq: np.ndarray,

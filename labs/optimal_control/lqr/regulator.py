@@ -14,10 +14,10 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from labs.algorithms.riccati import SteadyState, solve, steady_state, steady_state_directly
+from labs.algorithms.riccati import SteadyState, solve, steady_state, steady_state_by_scipy
 from labs.errors import LabError
 from labs.optimal_control.lqr.linear_systems import LinearSystem, linear_system
-from labs.optimal_control.lqr.own_system import OwnSystem, own_system
+from labs.optimal_control.lqr.own_system import OwnSystem, parse_own_system
 from labs.problems.linear_quadratic import LqrPolicy, LqrProblem
 
 MAX_RECURSIONS = 20_000
@@ -57,7 +57,9 @@ class RegulatorSettings:
     @property
     def linear_system(self) -> LinearSystem | OwnSystem:
         """What is regulated."""
-        return own_system(self.own, self.continuous) if self.own else linear_system(self.system)
+        return (
+            parse_own_system(self.own, self.continuous) if self.own else linear_system(self.system)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +96,7 @@ class Regulator:
         return self.optimal.values[: len(self.gains)]
 
     @cached_property
-    def growth(self) -> float:
+    def spectral_radius(self) -> float:
         """By what factor dx grows or shrinks in a period in the long run, where it is small: the
         spectral radius of one cycle of gains, per period."""
         p, cycle = self.problem, np.eye(self.problem.n)
@@ -103,14 +105,14 @@ class Regulator:
         return float(np.abs(np.linalg.eigvals(cycle)).max() ** (1.0 / len(self.gains)))
 
     @cached_property
-    def mismatch(self) -> float:
+    def riccati_error(self) -> float:
         """Largest difference of the recursion's P to SciPy's, as a share of the largest entry;
         -1 where there is no steady state or SciPy finds none."""
         p = self.problem
         if self.steady is None:
             return -1.0
         try:
-            reference = steady_state_directly(p.a, p.b, p.q, p.r)
+            reference = steady_state_by_scipy(p.a, p.b, p.q, p.r)
         except LabError:
             return -1.0
         if reference.trouble:
@@ -121,9 +123,9 @@ class Regulator:
         )
 
     @cached_property
-    def constant_gains(self) -> int:
+    def constant_gain_count(self) -> int:
         """How many gains of the horizon, from t = 0 on, are the steady one within SETTLING_BAND."""
-        return last_settled(self.relative_to_steady()[1]) + 1
+        return settling_step(self.relative_to_steady()[1]) + 1
 
     def relative_to_steady(self) -> tuple[np.ndarray, np.ndarray]:
         """Elements of P_t (N + 1, k) and K_t (N, k) as shares of their steady values, or of those
@@ -160,7 +162,7 @@ class Regulator:
         return float(dx @ self.problem.q @ dx + du @ self.problem.r @ du)
 
 
-def last_settled(shares: np.ndarray) -> int:
+def settling_step(shares: np.ndarray) -> int:
     """The last t up to which all shares (N, k) are within SETTLING_BAND of 1; -1 if none is."""
     off = np.abs(shares - 1.0).max(axis=1, initial=0.0) > SETTLING_BAND
     return int(np.argmax(off)) - 1 if off.any() else len(shares) - 1

@@ -11,7 +11,7 @@ import numpy as np
 from labs.algorithms.riccati import prepare
 from labs.lab import Action, Handle, Inputs, Lab, Measurement, State
 from labs.models.coordinates import coordinate_labels
-from labs.models.discrete import Discrete
+from labs.models.discrete import DiscreteMechanism
 from labs.models.mechanisms import Mechanism, mechanism
 from labs.optimal_control.lqr_tracking.laps import (
     CONTROL_PERIOD,
@@ -117,7 +117,7 @@ class LqrTracking(Lab[TrackingParams, TrackingState]):
             costs.append(now.cost(dx, du))
         phase = now.index + 1
         x_ref = now.lap.x_ref[phase % params.samples]
-        if trouble := _divergence(state.t, after, x_ref):
+        if trouble := _divergence_message(state.t, after, x_ref):
             stopped = copy.deepcopy(state)
             stopped.trouble = trouble
             return stopped
@@ -199,10 +199,10 @@ class LqrTracking(Lab[TrackingParams, TrackingState]):
 def _next_state(world: Mechanism, x: np.ndarray, u: np.ndarray, force: float) -> np.ndarray:
     """x+ under the control and a force [N] along y."""
     held = u + side_force(world, x[: world.nq], force)
-    return Discrete(world, CONTROL_PERIOD, INTEGRATION_METHOD).step(x, held)
+    return DiscreteMechanism(world, CONTROL_PERIOD, INTEGRATION_METHOD).step(x, held)
 
 
-def _divergence(t: float, after: list[np.ndarray], x_ref: np.ndarray) -> str:
+def _divergence_message(t: float, after: list[np.ndarray], x_ref: np.ndarray) -> str:
     """A sentence once robot or ghost are too far off for any linearisation; else empty."""
     nq = len(x_ref) // 2
     for name, x in zip(("robot", "ghost"), after, strict=True):

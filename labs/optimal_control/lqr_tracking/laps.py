@@ -28,7 +28,7 @@ import pinocchio as pin
 from labs.algorithms.inverse_kinematics import pose_error
 from labs.errors import LabError
 from labs.models.cart_pole import HINGE_HEIGHT
-from labs.models.discrete import Discrete
+from labs.models.discrete import DiscreteMechanism
 from labs.models.mechanisms import Mechanism, mechanism
 
 CONTROL_PERIOD = 0.02
@@ -77,7 +77,7 @@ PATHS: Mapping[str, Callable[[np.ndarray], PlanePath]] = {"circle": circle, "squ
 
 
 @dataclass(frozen=True)
-class Course:
+class ReferencePath:
     """Where a mechanism is sent: one lap of `samples` control periods."""
 
     robot: str
@@ -110,20 +110,22 @@ class Lap:
 
 
 @lru_cache(maxsize=32)
-def lap(course: Course, feed_forward: str = "inverse-dynamics", force: float = 0.0) -> Lap:
+def lap(course: ReferencePath, feed_forward: str = "inverse-dynamics", force: float = 0.0) -> Lap:
     """The lap of a course with one of FEED_FORWARDS, under a `force` [N] along the world's y axis
     that is known. Raises LabError where the arm does not reach, or a name is none."""
     for name, names in ((course.path, PATHS), (feed_forward, FEED_FORWARDS)):
         if name not in names:
             raise LabError(f"there is no {name!r}; there are {', '.join(names)}")
     robot = mechanism(course.robot)
-    q, v, a = _motion(course)
+    q, v, a = _joint_motion(course)
     u_ref = np.stack(
         [_feed_forward(robot, feed_forward, *row) for row in zip(q, v, a, strict=True)]
     )
     x_ref = np.hstack([q, v])
     pushed = u_ref + np.stack([side_force(robot, row, force) for row in q])
-    after, A, B = Discrete(robot, CONTROL_PERIOD, INTEGRATION_METHOD).linearize(x_ref, pushed)
+    after, A, B = DiscreteMechanism(robot, CONTROL_PERIOD, INTEGRATION_METHOD).linearize(
+        x_ref, pushed
+    )
     points = np.stack([tracked_point(robot, row) for row in q])
     return Lap(x_ref, u_ref, A, B, after - np.roll(x_ref, -1, axis=0), points)
 
@@ -135,7 +137,7 @@ def side_force(robot: Mechanism, q: np.ndarray, force: float) -> np.ndarray:
         return np.zeros(robot.nu)
     if robot.name == "cart-pole":
         return np.array([force])
-    return force * robot.tip_jacobian(q)[1, list(robot.driven)]
+    return force * robot.tip_jacobian(q)[1, list(robot.actuated_joints)]
 
 
 def tracked_point(robot: Mechanism, q: np.ndarray) -> np.ndarray:
@@ -146,7 +148,7 @@ def tracked_point(robot: Mechanism, q: np.ndarray) -> np.ndarray:
 def _feed_forward(
     robot: Mechanism, name: str, q: np.ndarray, v: np.ndarray, a: np.ndarray
 ) -> np.ndarray:
-    model, data, driven = robot.model, robot.data, list(robot.driven)
+    model, data, driven = robot.model, robot.data, list(robot.actuated_joints)
     if name == "none":
         return np.zeros(robot.nu)
     if name == "gravity":
@@ -155,18 +157,20 @@ def _feed_forward(
 
 
 @lru_cache(maxsize=32)
-def _motion(course: Course) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _joint_motion(course: ReferencePath) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """q, q' and q'' (M, nq) along the course."""
     flat = PATHS[course.path](np.arange(course.samples) / course.samples)
     rate = 1.0 / (course.samples * CONTROL_PERIOD)
     s, ds, dds = (course.size * rate**k * part for k, part in enumerate(flat))
     if course.robot == "cart-pole":
-        return _upright(course, s, ds, dds)
-    return _reaching(course, *(part @ np.array(PLANES[course.plane]) for part in (s, ds, dds)))
+        return _cart_pole_motion(course, s, ds, dds)
+    return _inverse_kinematics(
+        course, *(part @ np.array(PLANES[course.plane]) for part in (s, ds, dds))
+    )
 
 
-def _upright(
-    course: Course, s: np.ndarray, ds: np.ndarray, dds: np.ndarray
+def _cart_pole_motion(
+    course: ReferencePath, s: np.ndarray, ds: np.ndarray, dds: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     q, v, a = np.zeros((3, course.samples, 2))
     q[:, 1] = np.pi
@@ -177,8 +181,8 @@ def _upright(
     return q, v, a
 
 
-def _reaching(
-    course: Course, p: np.ndarray, dp: np.ndarray, ddp: np.ndarray
+def _inverse_kinematics(
+    course: ReferencePath, p: np.ndarray, dp: np.ndarray, ddp: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Inverse kinematics from one sample to the next; p is seen from where the arm's end-effector
     is at home."""

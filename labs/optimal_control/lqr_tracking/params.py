@@ -1,6 +1,6 @@
 """The tunables of the reference, the policy and the world it meets."""
 
-from labs.optimal_control.lqr_tracking.laps import CONTROL_PERIOD, FEED_FORWARDS, Course
+from labs.optimal_control.lqr_tracking.laps import CONTROL_PERIOD, FEED_FORWARDS, ReferencePath
 from labs.optimal_control.lqr_tracking.tracking import (
     LimitedPreview,
     TrackingSettings,
@@ -98,15 +98,15 @@ class TrackingParams(Params):
         return round(self.lap_time / CONTROL_PERIOD)
 
     @property
-    def course(self) -> Course:
+    def reference_path(self) -> ReferencePath:
         if self.robot == "cart-pole":
-            return Course(self.robot, self.path, self.stroke, self.samples)
-        return Course(self.robot, self.path, self.radius, self.samples, self.plane)
+            return ReferencePath(self.robot, self.path, self.stroke, self.samples)
+        return ReferencePath(self.robot, self.path, self.radius, self.samples, self.plane)
 
     @property
     def settings(self) -> TrackingSettings:
         return TrackingSettings(
-            self.course,
+            self.reference_path,
             self.feed_forward,
             self.wind if self.wind_known else 0.0,
             (self.position_weight, self.velocity_weight, self.effort_weight),

@@ -35,13 +35,13 @@ def draw_tracking(
     nq, (x, ghost) = robot.nq, states
     u = now.u_ref + now.gain @ (x - now.x_ref) + now.k
     effort = np.zeros(nq)
-    effort[list(robot.driven)] = np.abs(u) / robot.control_limit
+    effort[list(robot.actuated_joints)] = np.abs(u) / robot.control_limit
     scene.camera(*CAMERAS[params.robot])
     scene.arm("robot", robot.arm, x[:nq], effort=effort)
     scene.arm("ghost", robot.arm, ghost[:nq], ghost=True)
     _draw_trails(scene, params, now, x, trails)
     scene.sphere("goal", now.lap.points[now.index], 0.014, "reference")
-    scene.handle("size", _handle(params, now.lap), 0.018)
+    scene.handle("size", _handle_position(params, now.lap), 0.018)
     if force != 0.0:
         tip = tracked_point(robot, x[:nq])
         scene.arrow("force", tip, tip + np.array([0.0, ARROW_SCALE * force, 0.0]))
@@ -53,14 +53,14 @@ def _draw_trails(
     """The reference with the part in view brighter, the plan from x (nx,), and the past."""
     robot, samples, steps = mechanism(params.robot), params.samples, int(params.preview)
     ahead = now.lap.points[(now.index + np.arange(max(samples, steps) + 1)) % samples]
-    deviations, _ = now.window.follow(now.policy, x - now.x_ref)
+    deviations, _ = now.window.rollout(now.policy, x - now.x_ref)
     planned = now.lap.x_ref[(now.index + np.arange(steps + 1)) % samples]
     rows = planned + deviations[: steps + 1]
     plan = np.array([tracked_point(robot, row[: robot.nq]) for row in rows])
     past, ghost_past = trails[:, -ARM_TRAIL:]
     if params.robot == "cart-pole":
-        ahead, plan = _unrolled(ahead[:CART_TRAIL]), _unrolled(plan)
-        past, ghost_past = (_unrolled(trail[::-1], -1.0) for trail in trails)
+        ahead, plan = _project_on_screen(ahead[:CART_TRAIL]), _project_on_screen(plan)
+        past, ghost_past = (_project_on_screen(trail[::-1], -1.0) for trail in trails)
     scene.trail("reference", ahead, "reference", 0.35)
     if steps > 0:
         scene.trail("preview", ahead[: steps + 1], "reference")
@@ -70,14 +70,14 @@ def _draw_trails(
         scene.trail("ghost's past", ghost_past, "muted")
 
 
-def _unrolled(points: np.ndarray, direction: float = 1.0) -> np.ndarray:
+def _project_on_screen(points: np.ndarray, direction: float = 1.0) -> np.ndarray:
     """Where a cart will be, on a screen behind the rail: the future above it and coming down; the
     past, newest first and with direction -1, below."""
     z = HINGE_HEIGHT + direction * SCROLL_SPEED * CONTROL_PERIOD * np.arange(len(points))
     return np.column_stack([np.full(len(points), SCREEN_X), points[:, 1], z])
 
 
-def _handle(params: TrackingParams, lap: Lap) -> np.ndarray:
+def _handle_position(params: TrackingParams, lap: Lap) -> np.ndarray:
     """Where the ball is that sets the size: on the lap's first point, or on the rail."""
     if params.robot == "cart-pole":
         return np.array([-0.1, params.stroke, HINGE_HEIGHT])

@@ -6,9 +6,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from labs.algorithms.periodic_lqr import Periodic, periodic, preview
+from labs.algorithms.periodic_lqr import PeriodicRegulator, preview_problem, solve_periodic
 from labs.models.mechanisms import mechanism
-from labs.optimal_control.lqr_tracking.laps import Course, Lap, lap
+from labs.optimal_control.lqr_tracking.laps import Lap, ReferencePath, lap
 from labs.problems.linear_quadratic import LqrPolicy, LqrProblem
 
 COSTED_JOINT = {"ur5": 1, "cart-pole": 0}
@@ -19,7 +19,7 @@ COSTED_JOINT = {"ur5": 1, "cart-pole": 0}
 class TrackingSettings:
     """All that the policies are made from."""
 
-    course: Course
+    reference_path: ReferencePath
     feed_forward: str
     """One of `laps.FEED_FORWARDS`."""
     force: float
@@ -69,21 +69,21 @@ class LimitedPreview:
 
 def reference_lap(settings: TrackingSettings) -> Lap:
     """The reference and the linear system along it."""
-    return lap(settings.course, settings.feed_forward, settings.force)
+    return lap(settings.reference_path, settings.feed_forward, settings.force)
 
 
 @lru_cache(maxsize=64)
-def full_preview(settings: TrackingSettings) -> Periodic:
+def full_preview(settings: TrackingSettings) -> PeriodicRegulator:
     """The policy of somebody who has all of the future in view, and its cost. Raises LabError as
     `laps.lap` and `periodic` do."""
     along = reference_lap(settings)
-    nq, limit = along.x_ref.shape[1] // 2, mechanism(settings.course.robot).control_limit
+    nq, limit = along.x_ref.shape[1] // 2, mechanism(settings.reference_path.robot).control_limit
     position_weight, velocity_weight, effort_weight = settings.weights
     q_linear, s_linear = np.zeros(2 * nq), np.zeros(len(limit))
-    joint = COSTED_JOINT[settings.course.robot]
+    joint = COSTED_JOINT[settings.reference_path.robot]
     q_linear[joint], s_linear[joint] = settings.linear_costs
     q = np.diag(np.repeat([position_weight, velocity_weight], nq))
-    return periodic(
+    return solve_periodic(
         LqrProblem(
             horizon=len(along.a),
             a=along.a,
@@ -102,6 +102,6 @@ def full_preview(settings: TrackingSettings) -> Periodic:
 def limited_preview(settings: TrackingSettings, index: int, steps: int) -> LimitedPreview:
     """From step `index` of the lap, with `steps` in view. Raises as `full_preview` does."""
     along, lasting = reference_lap(settings), full_preview(settings)
-    window, policy = preview(lasting, index, steps)
+    window, policy = preview_problem(lasting, index, steps)
     x_ref, u_ref = along.x_ref[index], along.u_ref[index]
     return LimitedPreview(along, index, x_ref, u_ref, lasting.problem, window, policy)

@@ -7,9 +7,9 @@ import numpy as np
 
 from labs.problems.receding_horizon import Plan
 
-PAST = 200
+PAST_STEPS = 200
 """World steps of the motion that are kept."""
-FAN, STRIDE = 8, 0.08
+KEPT_PREDICTIONS, PREDICTION_SPACING = 8, 0.08
 """Earlier predictions that are kept; the time [s] between two of them."""
 
 
@@ -37,42 +37,42 @@ class PlanningHistory:
     """Arrays are never written into again."""
 
     past: np.ndarray
-    """(up to PAST, nx) the states of the last world steps, the present one last."""
-    fan: tuple[PlannedMotion, ...] = ()
+    """(up to PAST_STEPS, nx) the states of the last world steps, the present one last."""
+    predictions: tuple[PlannedMotion, ...] = ()
     """Earlier predictions, the oldest first."""
     latest: PlannedMotion | None = None
     first: PlannedMotion | None = None
-    promised: float | None = None
+    predicted_cost: float | None = None
     """What the first plan was to cost."""
-    paid: float = 0.0
+    cost: float = 0.0
     """What was paid since then, up to the present period,"""
-    over_horizon: float | None = None
+    horizon_cost: float | None = None
     """and over the horizon of the first plan, with l_f at its end; None before that."""
-    off_first: float = 0.0
+    deviation_from_first: float = 0.0
     """Largest deviation of a position from the first plan, while it lasts."""
 
-    def moved(self, x: np.ndarray) -> Self:
+    def append_state(self, x: np.ndarray) -> Self:
         """A world step later, at x."""
-        return replace(self, past=np.concatenate([self.past[1 - PAST :], x[None]]))
+        return replace(self, past=np.concatenate([self.past[1 - PAST_STEPS :], x[None]]))
 
-    def planned(self, plan: Plan, t: float, h: float) -> Self:
+    def append_plan(self, plan: Plan, t: float, h: float) -> Self:
         """With a new plan, which begins at t."""
-        now, fan = PlannedMotion(t, h, plan.X), self.fan
-        if self.latest and (not fan or self.latest.t - fan[-1].t > STRIDE - 0.5 * h):
-            fan = (*fan, self.latest)[-FAN:]
+        now, fan = PlannedMotion(t, h, plan.X), self.predictions
+        if self.latest and (not fan or self.latest.t - fan[-1].t > PREDICTION_SPACING - 0.5 * h):
+            fan = (*fan, self.latest)[-KEPT_PREDICTIONS:]
         if self.first is None:
-            return replace(self, latest=now, first=now, promised=plan.cost)
-        return replace(self, latest=now, fan=fan)
+            return replace(self, latest=now, first=now, predicted_cost=plan.cost)
+        return replace(self, latest=now, predictions=fan)
 
-    def met(self, x: np.ndarray, t: float, running: float, final: float) -> Self:
+    def start_period(self, x: np.ndarray, t: float, running: float, final: float) -> Self:
         """At the start of a period, at x, the last one having cost `running`; `final` is l_f."""
-        paid, first = self.paid + running, self.first
+        paid, first = self.cost + running, self.first
         if first is None:
             return self
         planned, n = first.at(t), len(x) // 2
         if planned is None:
-            return replace(self, paid=paid)
-        off = max(self.off_first, float(np.abs(x[:n] - planned[:n]).max()))
+            return replace(self, cost=paid)
+        off = max(self.deviation_from_first, float(np.abs(x[:n] - planned[:n]).max()))
         ended = t > first.times[-1] - 0.5 * first.h
-        over = paid + final if ended else self.over_horizon
-        return replace(self, paid=paid, off_first=off, over_horizon=over)
+        over = paid + final if ended else self.horizon_cost
+        return replace(self, cost=paid, deviation_from_first=off, horizon_cost=over)

@@ -8,18 +8,18 @@ from typing import ClassVar
 import numpy as np
 
 from labs.algorithms import mpc
-from labs.algorithms.mpc import RecedingHorizon
+from labs.algorithms.mpc import RecedingHorizonState
 from labs.lab import Action, Handle, Inputs, Lab, Measurement, State
 from labs.models.coordinates import coordinate_labels
 from labs.models.mechanisms import mechanism
-from labs.optimal_control.mpc.controller import control, cost_terms, planner_of
+from labs.optimal_control.mpc.controller import control_step, cost_terms, planner_of
 from labs.optimal_control.mpc.history import PlanningHistory
 from labs.optimal_control.mpc.params import MpcParams
 from labs.optimal_control.mpc.picture import draw_goal, draw_limits, draw_predictions, draw_robot
 from labs.optimal_control.mpc.plots import (
     PHASES,
     PLOTS,
-    TIMED,
+    TIMED_PLANS,
     horizon_note,
     limit_fields,
     prediction_fields,
@@ -31,7 +31,7 @@ from labs.params import Value
 from labs.problems.receding_horizon import Plan
 from labs.scene import Scene
 
-PERIOD = 0.01
+WORLD_PERIOD = 0.01
 """[s] of the world's clock; a period of the controller is a whole number of them."""
 LARGEST_VELOCITY = 200.0
 """[rad/s; m/s] a run with a faster joint has diverged."""
@@ -45,26 +45,26 @@ class MpcState(State):
 
     x: np.ndarray
     """(nx,)"""
-    base: np.ndarray
+    hold_start: np.ndarray
     """(nx,) where the present control began to act undisturbed,"""
-    held: int = 0
+    hold_steps: int = 0
     """so many world steps ago."""
-    elapsed: int = 0
+    period_steps: int = 0
     """World steps since the period began."""
-    aim: np.ndarray
+    target: np.ndarray
     """(3,) [m] where the target was when the period began."""
-    controller: RecedingHorizon
-    terms: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    controller: RecedingHorizonState
+    cost_terms: np.ndarray = field(default_factory=lambda: np.zeros(3))
     """(3,) what position, velocity and control cost in the last period."""
     excess: float = 0.0
     """By how much the last plan exceeds soft limits."""
     gap: float | None = None
     iterations: int = 0
     history: PlanningHistory
-    pushed: int = 0
+    arrow_steps_left: int = 0
     """World steps the arrow of a push still stays."""
     clock: int = 0
-    """World steps done: t = clock * PERIOD."""
+    """World steps done: t = clock * WORLD_PERIOD."""
 
 
 class Mpc(Lab[MpcParams, MpcState]):
@@ -77,7 +77,7 @@ class Mpc(Lab[MpcParams, MpcState]):
         "predicts, and what it then does."
     )
     Params = MpcParams
-    period = PERIOD
+    period = WORLD_PERIOD
     plots = PLOTS
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "UR5, a target that moves": {"turns": 0.25},
@@ -96,8 +96,8 @@ class Mpc(Lab[MpcParams, MpcState]):
         at = params.robot
         return MpcState(
             x=at.x0,
-            base=at.x0,
-            aim=params.target_at(0.0),
+            hold_start=at.x0,
+            target=params.target_at(0.0),
             controller=mpc.init(params.options, at.brake(at.x0)),
             history=PlanningHistory(at.x0[None]),
         )
@@ -125,53 +125,55 @@ class Mpc(Lab[MpcParams, MpcState]):
         """10 ms: a plan where a period begins, and the plant under the control that acts."""
         if state.trouble:
             return state
-        state = replace(state, pushed=max(state.pushed - 1, 0))
+        state = replace(state, arrow_steps_left=max(state.arrow_steps_left - 1, 0))
         if "push" in inputs.actions:
-            state = _pushed(params, state)
-        if state.elapsed == 0:
-            state = self._control(params, state)
+            state = _apply_impulse(params, state)
+        if state.period_steps == 0:
+            state = self._start_period(params, state)
         clock = state.clock + 1
-        state = replace(state, clock=clock, t=clock * PERIOD)
+        state = replace(state, clock=clock, t=clock * WORLD_PERIOD)
         if params.mode == "plan":
-            return replace(state, elapsed=0, history=state.history.moved(state.x))
-        held, elapsed = state.held + 1, state.elapsed + 1
-        plant = dynamics(params.system, held * PERIOD, params.payload)
+            return replace(state, period_steps=0, history=state.history.append_state(state.x))
+        held, elapsed = state.hold_steps + 1, state.period_steps + 1
+        plant = dynamics(params.system, held * WORLD_PERIOD, params.payload)
         with np.errstate(all="ignore"):
-            x = plant.step(state.base, state.controller.u)
+            x = plant.step(state.hold_start, state.controller.u)
         if not np.abs(x[params.robot.n :]).max() < LARGEST_VELOCITY:
             return replace(
                 state,
                 trouble=f"The robot went out of control at t = {state.t:.2f} s. Reset, and give it "
                 "more control, a longer horizon or less delay.",
             )
-        state = replace(state, x=x, held=held, elapsed=elapsed, history=state.history.moved(x))
-        if elapsed * PERIOD > params.h - 0.5 * PERIOD:
-            return replace(state, base=x, held=0, elapsed=0)
+        state = replace(
+            state, x=x, hold_steps=held, period_steps=elapsed, history=state.history.append_state(x)
+        )
+        if elapsed * WORLD_PERIOD > params.h - 0.5 * WORLD_PERIOD:
+            return replace(state, hold_start=x, hold_steps=0, period_steps=0)
         return state
 
-    def _control(self, params: MpcParams, state: MpcState) -> MpcState:
+    def _start_period(self, params: MpcParams, state: MpcState) -> MpcState:
         """The start of a period."""
         aim = params.target_at(state.t)
         reference = planner_of(params, aim).problem
         dx = state.x - reference.x_ref
         final = float(0.5 * dx @ reference.Q_f @ dx)
-        history = state.history.met(state.x, state.t, float(state.terms.sum()), final)
-        at, said = control(params, aim, state.controller, state.x)
+        history = state.history.start_period(state.x, state.t, float(state.cost_terms.sum()), final)
+        at, said = control_step(params, aim, state.controller, state.x)
         if said and said.found:
             lead = params.delay * params.h if params.compensate and params.mode == "both" else 0.0
-            history = history.planned(said, state.t + lead, params.h)
+            history = history.append_plan(said, state.t + lead, params.h)
         acts = params.mode != "plan"
         terms = cost_terms(params, aim, state.x, at.u) if acts else np.zeros(3)
         return replace(
             state,
-            aim=aim,
+            target=aim,
             controller=at,
             history=history,
-            terms=terms,
+            cost_terms=terms,
             excess=said.violation if said else state.excess,
             gap=said.gap if said else state.gap,
             iterations=said.iterations if said else 0,
-            seconds=_with_times(state.seconds, said),
+            seconds=_append_durations(state.seconds, said),
         )
 
     # What is shown ----------------------------------------------------------------------------
@@ -179,14 +181,14 @@ class Mpc(Lab[MpcParams, MpcState]):
     def measure(self, params: MpcParams, state: MpcState) -> Measurement:
         """The robot, its limits, and numbers of plan and motion."""
         at, u, history = params.robot, state.controller.u, state.history
-        goal = planner_of(params, state.aim).problem.x_ref[: at.n]
+        goal = planner_of(params, state.target).problem.x_ref[: at.n]
         x_lower, x_upper, u_max = params.bounds
         q, v = state.x[: at.n], state.x[at.n :]
         excess = np.maximum(state.x - x_upper, x_lower - state.x).max()
         if params.ball:
             depth = params.ball.radius - np.linalg.norm(at.mechanism.tip(q) - params.ball.center)
             excess = max(float(excess), float(depth))
-        wanted = state.aim if params.system != "cart-pole" else at.mechanism.tip(goal)
+        wanted = state.target if params.system != "cart-pole" else at.mechanism.tip(goal)
         found: dict[str, float | np.ndarray] = {
             "q": q,
             "goal": goal,
@@ -194,13 +196,13 @@ class Mpc(Lab[MpcParams, MpcState]):
             "u": u,
             "share": np.abs(u) / u_max,
             "one": np.ones(len(u)),
-            "cost_q": state.terms[0] / params.h,
-            "cost_v": state.terms[1] / params.h,
-            "cost_u": state.terms[2] / params.h,
+            "cost_q": state.cost_terms[0] / params.h,
+            "cost_v": state.cost_terms[1] / params.h,
+            "cost_u": state.cost_terms[2] / params.h,
             "miss": float(np.linalg.norm(at.mechanism.tip(q) - wanted)),
             "exceeded": float(max(excess, 0.0)),
-            "paid": history.paid,
-            "off_first": history.off_first,
+            "paid": history.cost,
+            "off_first": history.deviation_from_first,
             "iterations": float(state.iterations),
             "failures": float(state.controller.failures),
         }
@@ -209,8 +211,8 @@ class Mpc(Lab[MpcParams, MpcState]):
             found["active"] = float(sum(rows.sum() for rows in plan.active.values()))
             found["value"] = plan.cost
         optional = {
-            "promised": history.promised,
-            "over_horizon": history.over_horizon,
+            "promised": history.predicted_cost,
+            "over_horizon": history.horizon_cost,
             "gap": state.gap,
         }
         return found | {name: x for name, x in optional.items() if x is not None}
@@ -247,7 +249,7 @@ class Mpc(Lab[MpcParams, MpcState]):
         draw_robot(scene, params, state.x, state.controller.u)
         draw_predictions(scene, params, state.history)
         draw_limits(scene, params, state.x, state.controller.u)
-        draw_goal(scene, params, state.aim, state.x, bool(state.pushed))
+        draw_goal(scene, params, state.target, state.x, bool(state.arrow_steps_left))
 
     @classmethod
     def prepare(cls) -> None:
@@ -258,22 +260,23 @@ class Mpc(Lab[MpcParams, MpcState]):
             lab.step(params, Inputs(), lab.init(params, np.random.default_rng(0)))
 
 
-def _pushed(params: MpcParams, state: MpcState) -> MpcState:
+def _apply_impulse(params: MpcParams, state: MpcState) -> MpcState:
     """After the impulse [N s] along y has struck the tip."""
     n, x = params.robot.n, state.x.copy()
     body = mechanism(params.system, params.payload)
     x[n:] += body.velocity_jump(x[:n], np.array([0.0, params.push, 0.0]))
-    return replace(state, x=x, base=x, held=0, pushed=ARROW_STEPS)
+    return replace(state, x=x, hold_start=x, hold_steps=0, arrow_steps_left=ARROW_STEPS)
 
 
-def _with_times(
+def _append_durations(
     before: Mapping[str, float | np.ndarray], said: Plan | None
 ) -> Mapping[str, float | np.ndarray]:
-    """The durations of the last plans by phase, each (up to TIMED,) [s], with those of one more."""
+    """The durations of the last plans by phase, each (up to TIMED_PLANS,) [s], with those of one
+    more."""
     if said is None:
         return before
     none = np.zeros(0)
     return {
-        phase: np.append(before.get(phase, none), said.seconds.get(phase, 0.0))[-TIMED:]
+        phase: np.append(before.get(phase, none), said.seconds.get(phase, 0.0))[-TIMED_PLANS:]
         for phase in PHASES
     }

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labs.algorithms.mpc import MpcOptions
-from labs.optimal_control.mpc.systems import TITLES, ControlledSystem, system
+from labs.optimal_control.mpc.systems import SYSTEM_TITLES, ControlledSystem, controlled_system
 from labs.params import Group, Params
 from labs.tasks.motion.tip_constraints import Ball
 
@@ -22,7 +22,7 @@ MODES = {
 
 ARMS = ("ur5", "double-pendulum")
 
-CIRCLE = 0.12
+CIRCLE_RADIUS = 0.12
 """[m] radius of the circle that a moving target goes round."""
 
 TASK = Group("Robot", effect="restart")
@@ -40,7 +40,7 @@ WORLD = Group("World")
 class MpcParams(Params):
     """What the user can turn."""
 
-    system: str = TASK.choice("ur5", TITLES, "Robot", key=True)
+    system: str = TASK.choice("ur5", SYSTEM_TITLES, "Robot", key=True)
     """What is controlled. The pendulums hang at first; to swing up the cart's pole plans must look
     0.6 s ahead: take a period of 20 ms."""
     mode: str = TASK.choice("both", MODES, "Controller", effect="live", key=True)
@@ -159,7 +159,7 @@ class MpcParams(Params):
 
     @property
     def robot(self) -> ControlledSystem:
-        return system(self.system)
+        return controlled_system(self.system)
 
     @property
     def N(self) -> int:
@@ -179,7 +179,7 @@ class MpcParams(Params):
         if self.system != "ur5":
             return self.target
         angle = 2.0 * np.pi * self.turns * t
-        return self.target + CIRCLE * np.array([0.0, np.sin(angle), 1.0 - np.cos(angle)])
+        return self.target + CIRCLE_RADIUS * np.array([0.0, np.sin(angle), 1.0 - np.cos(angle)])
 
     @property
     def ball(self) -> Ball | None:
@@ -199,7 +199,7 @@ class MpcParams(Params):
         return at.x0 - reach, at.x0 + reach, self.u_limit * at.u_0
 
     @property
-    def rounds(self) -> int | None:
+    def max_iterations(self) -> int | None:
         """Iterations a period; None: to convergence."""
         return None if self.iterations == "all" else int(self.iterations)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pinocchio as pin
 
-from labs.optimal_control.mpc.history import FAN, PlanningHistory
+from labs.optimal_control.mpc.history import KEPT_PREDICTIONS, PlanningHistory
 from labs.optimal_control.mpc.params import MpcParams
 from labs.scene import Scene
 from labs.tasks.motion.motions import tip_path
@@ -12,7 +12,7 @@ SPACING = 0.02
 """[m] by which an earlier prediction of a motion in a plane stands behind the next."""
 ARROW_SCALE = 0.06
 """[m/(N s)] length of the arrow of a push."""
-FAR = 0.05
+GHOST_DISTANCE = 0.05
 """[m] between the tip and where it will be, from which on the robot is also drawn there."""
 NEAR_LIMIT = 1.0 - 1e-3
 """Part of a limit from which on it is called reached."""
@@ -23,10 +23,10 @@ def draw_robot(scene: Scene, params: MpcParams, x: np.ndarray, u: np.ndarray) ->
     """The robot, rings about the joints that are near a limit of any kind."""
     at = params.robot
     scene.camera(*at.camera)
-    scene.arm("robot", at.mechanism.arm, x[: at.n], effort=shares(params, x, u).max(axis=0))
+    scene.arm("robot", at.mechanism.arm, x[: at.n], effort=limit_usage(params, x, u).max(axis=0))
 
 
-def shares(params: MpcParams, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+def limit_usage(params: MpcParams, x: np.ndarray, u: np.ndarray) -> np.ndarray:
     """(3, nq): what position, velocity and control are of their limits at each joint."""
     at = params.robot
     _, upper, u_max = params.bounds
@@ -40,26 +40,31 @@ def draw_predictions(scene: Scene, params: MpcParams, history: PlanningHistory) 
     planar = params.system != "ur5"
     if len(history.past) > 1:
         scene.trail("past", tip_path(at.mechanism, history.past[::2]))
-    for i, old in enumerate(history.fan):
-        age = len(history.fan) - i
+    for i, old in enumerate(history.predictions):
+        age = len(history.predictions) - i
         behind = np.array([-SPACING * age * planar, 0.0, 0.0])
         path = tip_path(at.mechanism, old.X[::2]) + behind
         if len(path) > 1:
-            scene.trail(f"before {age}", path, "muted", (FAN + 1 - age) / (FAN + 1))
+            scene.trail(
+                f"before {age}",
+                path,
+                "muted",
+                (KEPT_PREDICTIONS + 1 - age) / (KEPT_PREDICTIONS + 1),
+            )
     now = history.latest
     if now is None:
         return
     path = tip_path(at.mechanism, now.X)
     scene.trail("prediction", path, "reference")
     scene.sphere("end of the horizon", path[-1], 0.012, "reference")
-    if np.linalg.norm(path[-1] - at.mechanism.tip(history.past[-1, : at.n])) > FAR:
+    if np.linalg.norm(path[-1] - at.mechanism.tip(history.past[-1, : at.n])) > GHOST_DISTANCE:
         scene.arm("at the end of the horizon", at.mechanism.arm, now.X[-1, : at.n], ghost=True)
 
 
 def draw_limits(scene: Scene, params: MpcParams, x: np.ndarray, u: np.ndarray) -> None:
     """At each joint the names of the limits that it is at."""
     at = params.robot
-    reached = shares(params, x, u) >= NEAR_LIMIT
+    reached = limit_usage(params, x, u) >= NEAR_LIMIT
     if not reached.any():
         return
     body = at.mechanism

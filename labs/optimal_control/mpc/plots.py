@@ -11,9 +11,9 @@ from labs.problems.receding_horizon import Plan
 
 PHASES = ("derivatives", "QP", "rest")
 """Of a plan, that are timed."""
-TIMED = 200
+TIMED_PLANS = 200
 """Plans whose durations are kept."""
-SWING_UP = 0.6
+MIN_SWING_UP_HORIZON = 0.6
 """[s] about so far a plan must look ahead to swing up the pole of a cart."""
 
 PLOTS: tuple[Plot, ...] = (
@@ -85,7 +85,7 @@ def prediction_fields(history: PlanningHistory, t: float, joint: int) -> dict[st
     if history.latest:
         found |= {"ahead_t": history.latest.times, "ahead_q": history.latest.X[:, joint]}
     # One line for all: out to the end of each prediction, back, and on to the next.
-    out_and_back = [(old.times, old.X[:, joint]) for old in history.fan]
+    out_and_back = [(old.times, old.X[:, joint]) for old in history.predictions]
     fan_t = [part for t, _ in out_and_back for part in (t, t[::-1])]
     fan_q = [part for _, q in out_and_back for part in (q, q[::-1])]
     return found | {
@@ -133,9 +133,9 @@ def time_note(seconds: Mapping[str, float | np.ndarray], h: float) -> str:
 def horizon_note(params: MpcParams) -> str:
     """Whether plans look too short a time ahead for what they are to do; empty if not."""
     ahead = params.N * params.h
-    if params.system != "cart-pole" or ahead > SWING_UP - 0.5 * params.h:
+    if params.system != "cart-pole" or ahead > MIN_SWING_UP_HORIZON - 0.5 * params.h:
         return ""
     return (
         f"Plans look {ahead:.2f} s ahead, too short a time to swing up the pole: give them "
-        f"{SWING_UP} s or more, by a period of 20 ms or by more steps."
+        f"{MIN_SWING_UP_HORIZON} s or more, by a period of 20 ms or by more steps."
     )

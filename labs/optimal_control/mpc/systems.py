@@ -6,7 +6,7 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from labs.models.discrete import Discrete
+from labs.models.discrete import DiscreteMechanism
 from labs.models.mechanisms import Mechanism, mechanism
 from labs.shapes import Vector3
 from labs.tasks.direct.systems import reaching_posture
@@ -14,9 +14,9 @@ from labs.tasks.motion.motions import FAR_VIEW, MOTIONS, ROBOT_VIEW
 
 ROD, HINGE = 0.5, 1.25
 """Length of each rod of the double pendulum, height of its hinge [m]."""
-NEARLY_STRAIGHT = 1.0 - 1e-9
+MAX_REACH = 1.0 - 1e-9
 """What the elbow's cosine is cut to."""
-BRAKING = 1.0
+BRAKE_GAIN = 1.0
 """[s/rad; s/m] of u_0 by which a braking motor works against each unit of velocity."""
 
 
@@ -46,14 +46,14 @@ class ControlledSystem:
 
     def brake(self, x: np.ndarray) -> np.ndarray:
         """u (nu,) that holds the arm against gravity and slows down what moves."""
-        driven = list(self.mechanism.driven)
-        u: np.ndarray = -BRAKING * self.u_0 * x[self.n :][driven]
-        return u + self.mechanism.holding(x[: self.n]) if len(driven) == self.n else u
+        driven = list(self.mechanism.actuated_joints)
+        u: np.ndarray = -BRAKE_GAIN * self.u_0 * x[self.n :][driven]
+        return u + self.mechanism.equilibrium_control(x[: self.n]) if len(driven) == self.n else u
 
 
 @cache
-def system(name: str) -> ControlledSystem:
-    """The one of this name, a key of TITLES."""
+def controlled_system(name: str) -> ControlledSystem:
+    """The one of this name, a key of SYSTEM_TITLES."""
     body = mechanism(name)
     title, q_limited, v_limited, shown, method, camera = _SYSTEMS[name]
     u_0 = MOTIONS[name].control_scale
@@ -63,9 +63,9 @@ def system(name: str) -> ControlledSystem:
 
 
 @lru_cache(maxsize=32)
-def dynamics(name: str, h: float, payload: float = 0.0) -> Discrete:
+def dynamics(name: str, h: float, payload: float = 0.0) -> DiscreteMechanism:
     """x+ = f(x, u) of this system over h [s], carrying a payload [kg]."""
-    return Discrete(mechanism(name, payload), h, system(name).method)
+    return DiscreteMechanism(mechanism(name, payload), h, controlled_system(name).method)
 
 
 def goal_posture(name: str, target: np.ndarray) -> np.ndarray:
@@ -74,13 +74,13 @@ def goal_posture(name: str, target: np.ndarray) -> np.ndarray:
     if name == "cart-pole":
         return np.array([target[1], np.pi])
     if name == "double-pendulum":
-        return _two_rods(target[1], target[2] - HINGE)
+        return _double_pendulum_posture(target[1], target[2] - HINGE)
     return reaching_posture(name, target)
 
 
-def _two_rods(y: float, z: float) -> np.ndarray:
+def _double_pendulum_posture(y: float, z: float) -> np.ndarray:
     """Angles of two rods of one length from hanging, the first in [0, 2 pi)."""
-    reach = min(np.hypot(y, z) / (2.0 * ROD), NEARLY_STRAIGHT)
+    reach = min(np.hypot(y, z) / (2.0 * ROD), MAX_REACH)
     elbow = 2.0 * np.arccos(reach)
     direction = np.arctan2(y, -z) % (2.0 * np.pi)
     return np.array([direction - 0.5 * elbow, elbow])
@@ -122,4 +122,4 @@ _SYSTEMS: Mapping[
         FAR_VIEW,
     ),
 }
-TITLES: Mapping[str, str] = {name: entry[0] for name, entry in _SYSTEMS.items()}
+SYSTEM_TITLES: Mapping[str, str] = {name: entry[0] for name, entry in _SYSTEMS.items()}

@@ -9,13 +9,26 @@ import numpy as np
 
 from labs.algorithms import mpc
 from labs.algorithms.linear_mpc import LinearPlanner
-from labs.algorithms.mpc import RecedingHorizon
+from labs.algorithms.mpc import RecedingHorizonState
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.optimal_control.mpc_feasibility.params import MpcFeasibilityParams
-from labs.optimal_control.mpc_feasibility.picture import draw_ending, draw_feasibility, plane_of
-from labs.optimal_control.mpc_feasibility.plots import PLOTS, plot_fields, words
-from labs.optimal_control.mpc_feasibility.problem import Setup, feasibility, own_system
-from labs.optimal_control.mpc_feasibility.sets import Growth, depth, growth, sets_of
+from labs.optimal_control.mpc_feasibility.picture import (
+    draw_feasibility,
+    draw_impact_speed,
+    plane_of,
+)
+from labs.optimal_control.mpc_feasibility.plots import PLOTS, set_fields, system_labels
+from labs.optimal_control.mpc_feasibility.problem import (
+    FeasibilitySettings,
+    feasibility,
+    feasibility_system,
+)
+from labs.optimal_control.mpc_feasibility.sets import (
+    AdmissibleSetGrowth,
+    compute_sets,
+    grow_admissible_set,
+    signed_distance,
+)
 from labs.params import Value
 from labs.problems.receding_horizon import Plan, Planner
 from labs.resumable import Resumable, run_to_completion
@@ -23,11 +36,11 @@ from labs.scene import Scene
 
 PENALTY = 1e3
 """Of softened limits, beside costs of natural size."""
-BEYOND = 0.02
+WALL_TOLERANCE = 0.02
 """Natural units past the wall at which it has run into it."""
-LOST = 3.0
+LOST_POSITION = 3.0
 """Natural units at which it ends where there is no wall."""
-KEPT = 1500
+PATH_POINTS = 1500
 """Points of a path: 30 s."""
 
 
@@ -37,21 +50,21 @@ class MpcFeasibilityState(State):
 
     z: np.ndarray
     """(2,) deviation of the state from the rest."""
-    controller: RecedingHorizon
+    controller: RecedingHorizonState
     """With the plan of the last period, and what acts until the next."""
     path: np.ndarray
     """(k, 2) z so far."""
     steps: int = 0
     """World steps done."""
-    failed: int = -1
+    first_failed_period: int = -1
     """The first period without a plan that keeps the limits; -1: none so far."""
-    why: str = ""
+    failure_reason: str = ""
     """Why there was none then."""
     failures: int = 0
     """Periods without one."""
-    over: bool = False
+    ended: bool = False
     """Whether it ran into the wall, or is lost where there is none: it stays where it is then."""
-    growth: Growth
+    growth: AdmissibleSetGrowth
 
 
 class MpcFeasibility(Lab[MpcFeasibilityParams, MpcFeasibilityState]):
@@ -88,15 +101,15 @@ class MpcFeasibility(Lab[MpcFeasibilityParams, MpcFeasibilityState]):
 
     def init(self, params: MpcFeasibilityParams, rng: np.random.Generator) -> MpcFeasibilityState:
         """At the start, with the first plan made."""
-        system = own_system(params.system)
+        system = feasibility_system(params.system)
         z = np.array([params.x1, params.x2]) * system.x_max
         state = MpcFeasibilityState(
             z=z,
             controller=mpc.init(mpc.MpcOptions(), np.zeros(1)),
             path=z[None],
-            growth=Growth(),
+            growth=AdmissibleSetGrowth(),
         )
-        return _plan(params, state)
+        return _start_period(params, state)
 
     # The solver's clock: the admissible set ---------------------------------------------------
 
@@ -105,7 +118,7 @@ class MpcFeasibility(Lab[MpcFeasibilityParams, MpcFeasibilityState]):
     ) -> Iterator[Snapshot | None]:
         """One t of the notes' algorithm a snapshot."""
         t = 0
-        for found in growth(params.setup):
+        for found in grow_admissible_set(params.setup):
             if found is None:
                 yield None
                 continue
@@ -121,7 +134,7 @@ class MpcFeasibility(Lab[MpcFeasibilityParams, MpcFeasibilityState]):
         self, params: MpcFeasibilityParams, handle: str, point: tuple[float, float, float]
     ) -> Mapping[str, Value]:
         """The balls in the plane: a new start, or a new goal."""
-        system = own_system(params.system)
+        system = feasibility_system(params.system)
         x = (plane_of(system).state_at(point) - system.x_eq) / system.x_max
         if handle == "goal":
             return {"goal": params.nearest("goal", x[0])}
@@ -135,21 +148,21 @@ class MpcFeasibility(Lab[MpcFeasibilityParams, MpcFeasibilityState]):
         """20 ms under the control of this period; at its end a plan from where that led."""
         steps = state.steps + 1
         state = replace(state, t=steps * self.period, steps=steps)
-        if state.over:
+        if state.ended:
             return state
-        A, B, _ = own_system(params.system).linear(self.period)
+        A, B, _ = feasibility_system(params.system).linear(self.period)
         z = A @ state.z + B @ state.controller.u
-        reach = params.p_max + BEYOND if params.state_limits else LOST
-        over = bool(abs(z[0]) > reach * own_system(params.system).x_max[0])
-        state = replace(state, z=z, over=over, path=np.vstack([state.path, z])[-KEPT:])
+        reach = params.p_max + WALL_TOLERANCE if params.state_limits else LOST_POSITION
+        over = bool(abs(z[0]) > reach * feasibility_system(params.system).x_max[0])
+        state = replace(state, z=z, ended=over, path=np.vstack([state.path, z])[-PATH_POINTS:])
         at_end = steps % round(params.period / self.period) == 0
-        return _plan(params, state) if at_end and not over else state
+        return _start_period(params, state) if at_end and not over else state
 
     # What is shown ----------------------------------------------------------------------------
 
     def measure(self, params: MpcFeasibilityParams, state: MpcFeasibilityState) -> Measurement:
         """States and controls in their units, distances to the sets' edges in natural ones."""
-        system, sets = own_system(params.system), sets_of(params.setup)
+        system, sets = feasibility_system(params.system), compute_sets(params.setup)
         at = feasibility(params.setup)
         x_max = np.array(system.x_max)
         u_max = system.u_max * params.u_max
@@ -161,15 +174,15 @@ class MpcFeasibility(Lab[MpcFeasibilityParams, MpcFeasibilityState]):
             "u_high": u_max,
             "u_low": -u_max,
             "failures": float(state.failures),
-            "share": 100.0 * sets.share,
+            "share": 100.0 * sets.feasible_share,
             "decided": float(len(params.setup.holds)),
         }
-        if state.failed >= 0:
-            measured["failed"] = float(state.failed)
+        if state.first_failed_period >= 0:
+            measured["failed"] = float(state.first_failed_period)
         if state.growth.found:
             measured["t_star"] = float(len(state.growth.J) - 1)
-        if np.isfinite(sets.dead):
-            measured |= {"dead": 100.0 * sets.dead, "leak": 100.0 * sets.leak}
+        if np.isfinite(sets.dead_end_share):
+            measured |= {"dead": 100.0 * sets.dead_end_share, "leak": 100.0 * sets.leak_share}
         if sets.rows:
             reach = params.p_max * x_max[0]
             measured |= {
@@ -177,27 +190,28 @@ class MpcFeasibility(Lab[MpcFeasibilityParams, MpcFeasibilityState]):
                 "p_low": float(system.x_eq[0] - reach),
                 "v_high": params.v_max * x_max[1],
                 "v_low": -params.v_max * x_max[1],
-                "depth_feasible": depth(sets.rows[0], state.z / x_max),
-                "depth_invariant": depth(sets.rows[1], state.z / x_max),
+                "depth_feasible": signed_distance(sets.rows[0], state.z / x_max),
+                "depth_invariant": signed_distance(sets.rows[1], state.z / x_max),
             }
-            if state.over:
+            if state.ended:
                 measured["impact"] = abs(float(state.z[1]))
         return measured
 
     def fields(
         self, params: MpcFeasibilityParams, state: MpcFeasibilityState
     ) -> Mapping[str, np.ndarray]:
-        return plot_fields(params.setup, state.growth)
+        return set_fields(params.setup, state.growth)
 
     def notes(self, params: MpcFeasibilityParams, state: MpcFeasibilityState) -> Mapping[str, str]:
         """What was planned now, and why the first period without a plan had none."""
         sentences = [state.controller.status or "This period has a plan that keeps all limits."]
-        if state.over:
-            sentences = [_ending(params, state)]
-        if state.failed >= 0:
-            when = f"period {state.failed}, t = {state.failed * params.period:.2f} s"
-            sentences.append(f"The first without one was {when}. {state.why}")
-        sticks_out = sets_of(params.setup).excess
+        if state.ended:
+            sentences = [_end_message(params, state)]
+        if state.first_failed_period >= 0:
+            k = state.first_failed_period
+            when = f"period {k}, t = {k * params.period:.2f} s"
+            sentences.append(f"The first without one was {when}. {state.failure_reason}")
+        sticks_out = compute_sets(params.setup).excess
         if sticks_out > 1e-6:
             sentences.append(
                 f"The terminal set is not control invariant: it sticks out by {sticks_out:.2g}, in "
@@ -208,13 +222,13 @@ class MpcFeasibility(Lab[MpcFeasibilityParams, MpcFeasibilityState]):
         return {"planner": "\n".join(sentences)}
 
     def labels(self, params: MpcFeasibilityParams) -> Mapping[str, str | tuple[str, ...]]:
-        return words(own_system(params.system))
+        return system_labels(feasibility_system(params.system))
 
     def draw(self, scene: Scene, params: MpcFeasibilityParams, state: MpcFeasibilityState) -> None:
         """The body, and the plane with the sets, the plan and the way so far."""
         draw_feasibility(scene, params, state.z, state.controller, state.path, state.growth)
-        if state.over:
-            draw_ending(scene, params, state.z)
+        if state.ended:
+            draw_impact_speed(scene, params, state.z)
 
     @classmethod
     def prepare(cls) -> None:
@@ -223,7 +237,7 @@ class MpcFeasibility(Lab[MpcFeasibilityParams, MpcFeasibilityState]):
             MpcFeasibilityParams(terminal="admissible"),
             MpcFeasibilityParams(fallback="soft"),
         ):
-            sets_of(params.setup)
+            compute_sets(params.setup)
             cls().init(params, np.random.default_rng(0))
 
 
@@ -240,7 +254,7 @@ class NoPlanner:
 
 
 @lru_cache(maxsize=16)
-def _planner(setup: Setup, soft: bool) -> Planner:
+def _planner(setup: FeasibilitySettings, soft: bool) -> Planner:
     at = feasibility(setup)
     if at.trouble:
         return NoPlanner(at.trouble)
@@ -249,7 +263,7 @@ def _planner(setup: Setup, soft: bool) -> Planner:
     return LinearPlanner(at.problem, holds=setup.holds if setup.block > 1 else None)
 
 
-def _plan(params: MpcFeasibilityParams, state: MpcFeasibilityState) -> MpcFeasibilityState:
+def _start_period(params: MpcFeasibilityParams, state: MpcFeasibilityState) -> MpcFeasibilityState:
     """A new period."""
     setup, soft = params.setup, params.fallback == "soft"
     A, B = feasibility(setup).problem.A, feasibility(setup).problem.B
@@ -272,19 +286,19 @@ def _plan(params: MpcFeasibilityParams, state: MpcFeasibilityState) -> MpcFeasib
         status = why = at.plan.message
     if not status:
         return replace(state, controller=at)
-    first = state.failed < 0
+    first = state.first_failed_period < 0
     return replace(
         state,
         controller=replace(at, status=status),
         failures=state.failures + 1,
-        failed=at.period - 1 if first else state.failed,
-        why=why if first else state.why,
+        first_failed_period=at.period - 1 if first else state.first_failed_period,
+        failure_reason=why if first else state.failure_reason,
     )
 
 
-def _ending(params: MpcFeasibilityParams, state: MpcFeasibilityState) -> str:
+def _end_message(params: MpcFeasibilityParams, state: MpcFeasibilityState) -> str:
     """What became of a run that is over."""
-    unit, speed = own_system(params.system).units[1], abs(float(state.z[1]))
+    unit, speed = feasibility_system(params.system).units[1], abs(float(state.z[1]))
     if not params.state_limits:
         return "It is lost: U is too small to bring it back. Start nearer to the goal."
     return (

@@ -2,9 +2,9 @@
 
 from collections.abc import Mapping
 
-from labs.optimal_control.mpc_feasibility.problem import Setup
+from labs.optimal_control.mpc_feasibility.problem import FeasibilitySettings
 from labs.params import Group, Params, Value
-from labs.tasks.phase_plane.picture import SHOWN
+from labs.tasks.phase_plane.picture import WINDOW_SCALE
 
 SYSTEM = Group("System", effect="restart")
 START = Group("Start", effect="restart")
@@ -120,9 +120,9 @@ class MpcFeasibilityParams(Params):
         return self.limited == "both"
 
     @property
-    def setup(self) -> Setup:
-        reach = (self.p_max, self.v_max) if self.state_limits else (SHOWN, SHOWN)
-        return Setup(
+    def setup(self) -> FeasibilitySettings:
+        reach = (self.p_max, self.v_max) if self.state_limits else (WINDOW_SCALE, WINDOW_SCALE)
+        return FeasibilitySettings(
             system=self.system,
             T=self.period,
             N=round(self.horizon),

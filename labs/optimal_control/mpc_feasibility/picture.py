@@ -4,23 +4,27 @@ from functools import lru_cache
 
 import numpy as np
 
-from labs.algorithms.mpc import RecedingHorizon
+from labs.algorithms.mpc import RecedingHorizonState
 from labs.algorithms.polygons import vertices
-from labs.models.pendulums import LENGTH
+from labs.models.pendulums import ROD_LENGTH
 from labs.optimal_control.mpc_feasibility.params import MpcFeasibilityParams
-from labs.optimal_control.mpc_feasibility.problem import Setup, feasibility, own_system
-from labs.optimal_control.mpc_feasibility.sets import Growth, sets_of
+from labs.optimal_control.mpc_feasibility.problem import (
+    FeasibilitySettings,
+    feasibility,
+    feasibility_system,
+)
+from labs.optimal_control.mpc_feasibility.sets import AdmissibleSetGrowth, compute_sets
 from labs.scene import Color, Scene
 from labs.tasks.phase_plane.picture import PhasePlane
 from labs.tasks.phase_plane.systems import PlaneSystem
 
-MOST = 9
+MAX_DRAWN_SETS = 9
 """Sets drawn of a chain."""
-ABOVE = MOST + 3
+ABOVE = MAX_DRAWN_SETS + 3
 """The layer above them."""
 FIRST, LAST = np.array([0.66, 0.88, 0.88]), np.array([0.27, 0.63, 0.66])
 """sRGB, from X_0 to X_N."""
-DOOMED = (0.85, 0.35, 0.25)
+DOOMED_COLOR = (0.85, 0.35, 0.25)
 """sRGB: of states without a plan, now or later."""
 WALL = 0.1
 """[m] half the cart."""
@@ -36,12 +40,12 @@ def draw_feasibility(
     scene: Scene,
     params: MpcFeasibilityParams,
     z: np.ndarray,
-    controller: RecedingHorizon,
+    controller: RecedingHorizonState,
     path: np.ndarray,
-    growth: Growth,
+    growth: AdmissibleSetGrowth,
 ) -> None:
     """One frame, at the deviation z (2,)."""
-    setup, system = params.setup, own_system(params.system)
+    setup, system = params.setup, feasibility_system(params.system)
     plane, rest = plane_of(system), np.array(system.x_eq)
     plane.draw_axes(scene)
     plane.draw_body(scene, rest + z)
@@ -56,20 +60,22 @@ def draw_feasibility(
     plane.handle(scene, "goal", rest + feasibility(setup).goal, 0.03)
 
 
-def _draw_feasible_sets(scene: Scene, plane: PhasePlane, rest: np.ndarray, setup: Setup) -> None:
-    sets = sets_of(setup)
+def _draw_feasible_sets(
+    scene: Scene, plane: PhasePlane, rest: np.ndarray, setup: FeasibilitySettings
+) -> None:
+    sets = compute_sets(setup)
     if not sets.chain:
         return
     plane.fill(scene, "X", rest + vertices(feasibility(setup).box), "muted", 0.15)
     # Without a terminal set the later ones hold the earlier, and say nothing of safety.
     shown = sets.chain[:1] if sets.terminal is None else sets.chain
     _draw_chain(scene, plane, rest, shown, "X")
-    for i, piece in enumerate(sets.doomed):
-        plane.fill(scene, f"doomed {i}", rest + piece, DOOMED, 0.9, layer=MOST + 1)
+    for i, piece in enumerate(sets.infeasible_regions):
+        plane.fill(scene, f"doomed {i}", rest + piece, DOOMED_COLOR, 0.9, layer=MAX_DRAWN_SETS + 1)
     if sets.terminal is not None:
         closed = np.vstack([sets.terminal, sets.terminal[:1]])
         if len(sets.terminal) >= 2:
-            plane.path(scene, "X_f", rest + closed, "reference", layer=MOST + 1)
+            plane.path(scene, "X_f", rest + closed, "reference", layer=MAX_DRAWN_SETS + 1)
 
 
 def _draw_chain(
@@ -82,7 +88,7 @@ def _draw_chain(
     """Some of the sets, the largest lowest, coloured by their places in the chain."""
     if not chain:
         return
-    chosen = np.unique(np.linspace(0, len(chain) - 1, MOST).round().astype(int))
+    chosen = np.unique(np.linspace(0, len(chain) - 1, MAX_DRAWN_SETS).round().astype(int))
     spans = {
         int(i): float(np.ptp(chain[i], axis=0).prod()) if len(chain[i]) else 0.0 for i in chosen
     }
@@ -96,7 +102,7 @@ def _draw_run(
     scene: Scene,
     plane: PhasePlane,
     rest: np.ndarray,
-    controller: RecedingHorizon,
+    controller: RecedingHorizonState,
     path: np.ndarray,
 ) -> None:
     """The way so far, and the plan that acts."""
@@ -121,17 +127,17 @@ def _draw_walls(scene: Scene, plane: PhasePlane, reach: float) -> None:
             ]
             scene.polygon(f"{name} wall", np.array(corners), "warning", 0.5)
         return
-    hinge = np.array([x, y, 0.25 + LENGTH])
+    hinge = np.array([x, y, 0.25 + ROD_LENGTH])
     for name, side in (("left", -1.0), ("right", 1.0)):
         angle = plane.system.x_eq[0] + plane.system.offset + side * reach
-        tip = hinge + 1.2 * LENGTH * np.array([0.0, np.sin(angle), -np.cos(angle)])
+        tip = hinge + 1.2 * ROD_LENGTH * np.array([0.0, np.sin(angle), -np.cos(angle)])
         scene.trail(f"{name} stop", np.array([hinge, tip]), "warning")
 
 
-def draw_ending(scene: Scene, params: MpcFeasibilityParams, z: np.ndarray) -> None:
+def draw_impact_speed(scene: Scene, params: MpcFeasibilityParams, z: np.ndarray) -> None:
     """At what speed it ran into the wall, beside the body."""
-    system = own_system(params.system)
+    system = feasibility_system(params.system)
     x, y = plane_of(system).body_place
-    at = (x, y + z[0], 0.3) if system.body == "mass" else (x, y, 0.35 + LENGTH)
+    at = (x, y + z[0], 0.3) if system.body == "mass" else (x, y, 0.35 + ROD_LENGTH)
     text = f"{abs(z[1]):.2f} {system.units[1]}" if params.state_limits else "lost"
     scene.label("ending", text, at)

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from labs.algorithms.polygons import area, vertices
-from labs.optimal_control.mpc_feasibility.problem import Setup, feasibility
-from labs.optimal_control.mpc_feasibility.sets import LIMITS, Growth, sets_of
+from labs.optimal_control.mpc_feasibility.problem import FeasibilitySettings, feasibility
+from labs.optimal_control.mpc_feasibility.sets import LIMIT_NAMES, AdmissibleSetGrowth, compute_sets
 from labs.plots import Curves, Line, Note, Plot, Readout, TimeSeries, Trace
 from labs.tasks.phase_plane.systems import PlaneSystem
 
@@ -37,7 +37,7 @@ PLOTS: tuple[Plot, ...] = (
         "What can still be broken",
         "t",
         "J* / limit",
-        Trace("t", "J", LIMITS, "marked", 1),
+        Trace("t", "J", LIMIT_NAMES, "marked", 1),
         Trace("t", "zero", "", "dash"),
     ),
     Curves(
@@ -75,9 +75,9 @@ PLOTS: tuple[Plot, ...] = (
 )
 
 
-def plot_fields(setup: Setup, growth: Growth) -> Mapping[str, np.ndarray]:
+def set_fields(setup: FeasibilitySettings, growth: AdmissibleSetGrowth) -> Mapping[str, np.ndarray]:
     """Of the sets, and of the admissible set's growth."""
-    at, sets = feasibility(setup), sets_of(setup)
+    at, sets = feasibility(setup), compute_sets(setup)
     whole = area(vertices(at.box))
     chain = [area(polygon) / whole for polygon in sets.chain]
     reach = setup.limits[0] * at.system.x_max[0]
@@ -99,7 +99,7 @@ def plot_fields(setup: Setup, growth: Growth) -> Mapping[str, np.ndarray]:
     }
 
 
-def words(system: PlaneSystem) -> Mapping[str, str]:
+def system_labels(system: PlaneSystem) -> Mapping[str, str]:
     """Names and units of a system."""
     return {
         "x_name": "position" if system.body == "mass" else "angle",

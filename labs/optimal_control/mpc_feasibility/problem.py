@@ -8,20 +8,20 @@ from functools import lru_cache
 
 import numpy as np
 
-from labs.algorithms.admissible_set import limits_under, maximal_output_admissible_set
+from labs.algorithms.admissible_set import closed_loop_limits, maximal_output_admissible_set
 from labs.algorithms.invariant_sets import maximal_control_invariant_set
 from labs.algorithms.riccati import steady_state
 from labs.problems.linear_mpc import LinearMpcProblem
 from labs.problems.polyhedron import Polyhedron, box
-from labs.tasks.phase_plane.systems import WEIGHT, PlaneSystem, plane_system
+from labs.tasks.phase_plane.systems import GRAVITY_TORQUE, PlaneSystem, plane_system
 
-NOTHING = box([1.0, 1.0], [-1.0, -1.0])
+EMPTY_SET = box([1.0, 1.0], [-1.0, -1.0])
 JOINT_REST = 0.6
 """[rad] from hanging: where the joint is linearised, so that gravity differs along its way."""
 
 
 @dataclass(frozen=True)
-class Setup:
+class FeasibilitySettings:
     """All numbers that sets and plans depend on; limits and goal in natural units."""
 
     system: str
@@ -62,21 +62,23 @@ class Feasibility:
     """What keeps the terminal set from existing, in a sentence."""
 
     @property
-    def loop(self) -> np.ndarray:
+    def closed_loop_matrix(self) -> np.ndarray:
         return np.asarray(self.problem.A + self.problem.B @ self.K)
 
 
 @lru_cache(maxsize=8)
-def own_system(name: str) -> PlaneSystem:
+def feasibility_system(name: str) -> PlaneSystem:
     """The system of this name; the joint rests at JOINT_REST, its natural torque holds it level."""
     system = plane_system(name)
-    return system if name != "joint" else replace(system.resting_at(JOINT_REST), u_max=WEIGHT)
+    return (
+        system if name != "joint" else replace(system.resting_at(JOINT_REST), u_max=GRAVITY_TORQUE)
+    )
 
 
 @lru_cache(maxsize=32)
-def feasibility(setup: Setup) -> Feasibility:
+def feasibility(setup: FeasibilitySettings) -> Feasibility:
     """The problem with its terminal set."""
-    system = own_system(setup.system)
+    system = feasibility_system(setup.system)
     A, B, _ = system.linear(setup.T)
     x_max = np.array(system.x_max)
     reach, u_max = x_max * setup.limits[:2], system.u_max * setup.limits[2]
@@ -86,7 +88,7 @@ def feasibility(setup: Setup) -> Feasibility:
     steady = steady_state(A, B, Q, R)
     goal = np.array([setup.goal * x_max[0], 0.0])
     w_goal = np.linalg.lstsq(B, goal - A @ goal, rcond=None)[0]
-    about = limits_under(steady.gain, _moved(X, goal), _moved(U, w_goal))
+    about = closed_loop_limits(steady.gain, _translate(X, goal), _translate(U, w_goal))
     room = bool((about.h > 1e-9).all())
     scaled = Polyhedron(about.H / about.h[:, None], np.ones(len(about.h))) if room else about
     terminal, trouble = None, ""
@@ -96,17 +98,17 @@ def feasibility(setup: Setup) -> Feasibility:
         terminal = box([-reach[0], 0.0], [reach[0], 0.0])
     elif setup.terminal == "admissible" and not room:
         terminal, trouble = (
-            NOTHING,
+            EMPTY_SET,
             "There is no admissible set: the goal is no rest within U and X",
         )
     elif setup.terminal == "admissible":
         found = maximal_output_admissible_set(A + B @ steady.gain, scaled)
-        terminal = _moved(found.set, -goal)
+        terminal = _translate(found.set, -goal)
     elif setup.terminal == "invariant":
         largest = maximal_control_invariant_set(A, B, X, U)
         terminal = largest.set
         if not largest.found:
-            terminal, trouble = NOTHING, f"No control invariant set: {largest.done}"
+            terminal, trouble = EMPTY_SET, f"No control invariant set: {largest.done}"
     problem = LinearMpcProblem(
         N=setup.N,
         A=A,
@@ -123,6 +125,6 @@ def feasibility(setup: Setup) -> Feasibility:
     return Feasibility(system, problem, goal, steady.gain, X, scaled if room else None, trouble)
 
 
-def _moved(polyhedron: Polyhedron, by: np.ndarray) -> Polyhedron:
+def _translate(polyhedron: Polyhedron, by: np.ndarray) -> Polyhedron:
     """{z : z + by in the polyhedron}"""
     return Polyhedron(polyhedron.H, polyhedron.h - polyhedron.H @ by)

@@ -14,7 +14,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from labs.algorithms.polygons import Unbounded, area, vertices
+from labs.algorithms.polygons import UnboundedError, area, vertices
 from labs.optimal_control.mpc_stability.formulation import Formulation
 from labs.problems.polyhedron import Polyhedron
 
@@ -53,11 +53,11 @@ class Assumptions:
 
 
 @lru_cache(maxsize=64)
-def check(formulation: Formulation) -> Assumptions:
+def check_assumptions(formulation: Formulation) -> Assumptions:
     """By matrices and by trial."""
     p, settings = formulation.problem, formulation.settings
-    x = _tried(formulation)
-    share, decrease = _descend(formulation, x)
+    x = _test_points(formulation)
+    share, decrease = _terminal_decrease(formulation, x)
     least = float(np.linalg.eigvalsh(p.Q)[0]) / 2.0
     economic = settings.task == "economic" and settings.price > 0.0
     return Assumptions(
@@ -74,25 +74,25 @@ def check(formulation: Formulation) -> Assumptions:
 def _area(end: Polyhedron | None) -> float:
     try:
         return np.inf if end is None else area(vertices(end))
-    except Unbounded:
+    except UnboundedError:
         return np.inf
 
 
-def _tried(formulation: Formulation) -> np.ndarray:
+def _test_points(formulation: Formulation) -> np.ndarray:
     """(k, 2) points of X_f, or of what is looked at where there is no X_f: around the origin."""
     end = formulation.problem.terminal_set
     if end is not None and not end.h.any():
         return np.zeros((1, 2))
     around = formulation.window if end is None else end
     angles = np.linspace(0.0, 2.0 * np.pi, RAYS, endpoint=False)
-    edge = to_edge(around, angles, np.array(formulation.system.x_max))
+    edge = boundary_points(around, angles, np.array(formulation.system.x_max))
     if end is not None and len(formulation.terminal_polygon):
         edge = np.vstack([edge, formulation.terminal_polygon])
     rings = np.linspace(0.0, 1.0, RINGS + 1)
     return np.asarray((rings[:, None, None] * edge).reshape(-1, 2))
 
 
-def to_edge(around: Polyhedron, angles: np.ndarray, units: np.ndarray) -> np.ndarray:
+def boundary_points(around: Polyhedron, angles: np.ndarray, units: np.ndarray) -> np.ndarray:
     """(k, 2): how far the set reaches from the origin, which lies in it, at angles (k,) in the
     given units (2,)."""
     ways = np.stack([np.cos(angles), np.sin(angles)], axis=1) * units
@@ -102,7 +102,7 @@ def to_edge(around: Polyhedron, angles: np.ndarray, units: np.ndarray) -> np.nda
     return np.asarray(ways * reach[:, None])
 
 
-def _descend(formulation: Formulation, x: np.ndarray) -> tuple[float, float]:
+def _terminal_decrease(formulation: Formulation, x: np.ndarray) -> tuple[float, float]:
     """Of points x (k, 2): the share from which no u leads into X_f, and the largest
     l_f(x+) - l_f(x) + l(x, u) of the others, with the best u."""
     p = formulation.problem
@@ -129,30 +129,33 @@ def _descend(formulation: Formulation, x: np.ndarray) -> tuple[float, float]:
     return float(1.0 - possible.mean()), float((change + formulation.stage_cost(x, u)).max())
 
 
-def sentences(formulation: Formulation) -> str:
+def assumptions_note(formulation: Formulation) -> str:
     """What follows, and the checklist: a line each."""
     if formulation.trouble:
         return formulation.trouble
-    found = check(formulation)
+    found = check_assumptions(formulation)
     marks = ["✓" if holds else "✗" for holds in found.hold]
     size = f"of area {found.terminal_area:.3g}" if found.hold[1] else "unbounded"
-    three = f"Change of the terminal cost in a step, plus l: at most {_number(found.decrease)}"
+    three = (
+        f"Change of the terminal cost in a step, plus l: at most {_format_number(found.decrease)}"
+    )
     if found.invariance > 0.0:
         three = f"From {found.invariance:.0%} of the terminal set no u leads into it"
-    bound = f"l ≥ {_number(found.stage_bound)} |x|²"
+    bound = f"l ≥ {_format_number(found.stage_bound)} |x|²"
     if found.stage_bound < 0.0:
         bound = f"l(0, u) ≥ {found.stage_bound:.3g}"
     lines = [
         "All hold: V* is a Lyapunov function on X₀."
         if all(found.hold)
         else "Not all hold: nothing is promised.",
-        f"{marks[0]} 1. At the origin f, l and the terminal cost are {_number(found.at_origin)}.",
+        f"{marks[0]} 1. At the origin f, l and the terminal cost are "
+        f"{_format_number(found.at_origin)}.",
         f"{marks[1]} 2. X × U is closed; the terminal set is {size}.",
         f"{marks[2]} 3a. {three}.",
-        f"{marks[3]} 3b. {bound}; terminal cost ≤ {_number(found.terminal_bound)} |x|².",
+        f"{marks[3]} 3b. {bound}; terminal cost ≤ {_format_number(found.terminal_bound)} |x|².",
     ]
     return "\n".join(lines)
 
 
-def _number(value: float) -> str:
+def _format_number(value: float) -> str:
     return "0" if abs(value) <= ROUNDING else f"{value:.3g}"

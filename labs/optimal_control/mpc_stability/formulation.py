@@ -11,21 +11,25 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from labs.algorithms.admissible_set import limits_under, maximal_output_admissible_set
+from labs.algorithms.admissible_set import closed_loop_limits, maximal_output_admissible_set
 from labs.algorithms.invariant_sets import feasible_sets
 from labs.algorithms.linear_mpc import LinearPlanner
 from labs.algorithms.polygons import clip, vertices
-from labs.algorithms.riccati import steady_state_directly
+from labs.algorithms.riccati import steady_state_by_scipy
 from labs.algorithms.terminal_cost import cost_of_gain
 from labs.errors import LabError
 from labs.optimal_control.mpc_stability.reference import Reference
 from labs.problems.linear_mpc import LinearMpcProblem
 from labs.problems.polyhedron import Polyhedron, box
-from labs.tasks.phase_plane.systems import STEP, PlaneSystem, plane_system
+from labs.tasks.phase_plane.systems import SIMULATION_STEP, PlaneSystem, plane_system
 
 SYSTEMS = {"cart": "Cart", "unstable": "Pendulum, upright"}
 PERIODS = {0.05: "50 ms", 0.1: "100 ms", 0.2: "200 ms"}
-TASKS = {"regulate": "Stay at the origin", "track": "Follow a motion", "economic": "Economic cost"}
+STABILITY_TASKS = {
+    "regulate": "Stay at the origin",
+    "track": "Follow a motion",
+    "economic": "Economic cost",
+}
 TERMINAL_COSTS = {"none": "None", "q": "α Q", "p": "P of u = K x"}
 TERMINAL_SETS = {"none": "None", "origin": "The origin", "invariant": "Maximal invariant set"}
 WINDOW = 1.1
@@ -78,15 +82,15 @@ class Formulation:
         if self.settings.task != "track":
             return self.planner
         ahead = k + np.arange(self.problem.N)
-        return self.planner.following(
+        return self.planner.with_terms(
             state_margins=self.reference.states(ahead) @ self.problem.state_set.H.T,
             control_margins=self.reference.controls(ahead) @ self.problem.control_set.H.T,
         )
 
     @cached_property
     def step(self) -> tuple[np.ndarray, np.ndarray]:
-        """A (2, 2) and B (2, 1) over STEP."""
-        A, B, _ = self.system.linear(STEP)
+        """A (2, 2) and B (2, 1) over SIMULATION_STEP."""
+        A, B, _ = self.system.linear(SIMULATION_STEP)
         return A, B
 
     def stage_cost(self, e: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -105,15 +109,15 @@ class Formulation:
     def terminal_polygon(self) -> np.ndarray:
         """(k, 2) the corners of X_f within the window; (0, 2) where there is no X_f."""
         end = self.problem.terminal_set
-        return np.zeros((0, 2)) if end is None else _within(self.window, end)
+        return np.zeros((0, 2)) if end is None else _intersect_window(self.window, end)
 
     @cached_property
     def feasible_polygon(self) -> np.ndarray:
         """(k, 2) those of X_0 within the window, of the problem without a reference."""
         p = self.problem
         if p.terminal_set is None and not len(p.state_set.h):
-            return _within(self.window, p.state_set)
-        return _within(self.window, feasible_sets(p)[0])
+            return _intersect_window(self.window, p.state_set)
+        return _intersect_window(self.window, feasible_sets(p)[0])
 
 
 @lru_cache(maxsize=64)
@@ -122,7 +126,7 @@ def formulate(settings: FormulationSettings) -> Formulation:
     system = plane_system(settings.system)
     A, B, _ = system.linear(settings.period)
     Q, R = np.diag(settings.weights), np.array([[settings.r]])
-    K = steady_state_directly(A, B, Q, settings.rho * R).gain
+    K = steady_state_by_scipy(A, B, Q, settings.rho * R).gain
     P = cost_of_gain(A, B, Q, R, K)
     costs = {"none": np.zeros((2, 2)), "q": settings.alpha * Q, "p": P}
     reach = np.array(system.x_max) if settings.limited else np.full(2, np.inf)
@@ -151,7 +155,7 @@ def formulate(settings: FormulationSettings) -> Formulation:
     elif settings.terminal_set == "origin":
         problem = replace(problem, terminal_set=box(np.zeros(2), np.zeros(2)))
     elif settings.terminal_set == "invariant":
-        limits = limits_under(K, box(-left_x, left_x), box([-left_u], [left_u]))
+        limits = closed_loop_limits(K, box(-left_x, left_x), box([-left_u], [left_u]))
         try:
             found = maximal_output_admissible_set(A + B @ K, limits)
             trouble = "" if found.found else f"No maximal invariant set: {found.done}."
@@ -161,5 +165,5 @@ def formulate(settings: FormulationSettings) -> Formulation:
     return Formulation(settings, problem, K, reference, trouble)
 
 
-def _within(window: Polyhedron, given: Polyhedron) -> np.ndarray:
+def _intersect_window(window: Polyhedron, given: Polyhedron) -> np.ndarray:
     return clip(vertices(window), given)

@@ -8,29 +8,29 @@ import numpy as np
 
 from labs.algorithms.polygons import area
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
-from labs.number_texts import counted
+from labs.number_texts import count_text
 from labs.optimal_control.mpc_stability import closed_loop, picture
-from labs.optimal_control.mpc_stability.assumptions import sentences
+from labs.optimal_control.mpc_stability.assumptions import assumptions_note
 from labs.optimal_control.mpc_stability.closed_loop import ClosedLoopRun
 from labs.optimal_control.mpc_stability.formulation import Formulation
 from labs.optimal_control.mpc_stability.params import MpcStabilityParams
 from labs.optimal_control.mpc_stability.plots import (
-    CHANGES,
+    CHANGE_NAMES,
     PLOTS,
     run_fields,
     surface_fields,
 )
 from labs.optimal_control.mpc_stability.value_surface import (
     FALLS,
+    RESOLUTIONS,
     RISES,
-    SIZES,
     ValueSurface,
     value_surface,
 )
 from labs.params import Value
 from labs.resumable import run_to_completion
 from labs.scene import Scene
-from labs.tasks.phase_plane.systems import STEP, plane_system
+from labs.tasks.phase_plane.systems import SIMULATION_STEP, plane_system
 
 
 @dataclass(kw_only=True)
@@ -40,7 +40,7 @@ class MpcStabilityState(State):
     steps: int = 0
     """World steps done: t = steps * period."""
     run: ClosedLoopRun
-    of: str
+    run_key: str
     """The problem and the start that the run is of."""
     surface: ValueSurface
 
@@ -55,7 +55,7 @@ class MpcStability(Lab[MpcStabilityParams, MpcStabilityState]):
         "terminal set make a stabilising controller of plans that look only a few steps ahead."
     )
     Params = MpcStabilityParams
-    period = STEP
+    period = SIMULATION_STEP
     plots = PLOTS
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Short-sighted": {"terminal_cost": "none", "terminal_set": "none", "limited": False},
@@ -89,11 +89,11 @@ class MpcStability(Lab[MpcStabilityParams, MpcStabilityState]):
 
     @classmethod
     def prepare(cls) -> None:
-        run_to_completion(value_surface(MpcStabilityParams().formulation, SIZES[0]))
+        run_to_completion(value_surface(MpcStabilityParams().formulation, RESOLUTIONS[0]))
 
     def init(self, params: MpcStabilityParams, rng: np.random.Generator) -> MpcStabilityState:
-        run = closed_loop.begin(params.formulation, params.start)
-        return MpcStabilityState(run=run, of=_key(params), surface=ValueSurface.nothing())
+        run = closed_loop.start_run(params.formulation, params.start)
+        return MpcStabilityState(run=run, run_key=_run_key(params), surface=ValueSurface.empty())
 
     # The world's clock ------------------------------------------------------------------------
 
@@ -101,12 +101,12 @@ class MpcStability(Lab[MpcStabilityParams, MpcStabilityState]):
         self, params: MpcStabilityParams, inputs: Inputs, state: MpcStabilityState
     ) -> MpcStabilityState:
         """10 ms; another problem or start begins another run."""
-        steps, key = state.steps + 1, _key(params)
-        if key == state.of:
-            run = closed_loop.advance(params.formulation, state.run)
+        steps, key = state.steps + 1, _run_key(params)
+        if key == state.run_key:
+            run = closed_loop.advance_run(params.formulation, state.run)
         else:
-            run = closed_loop.begin(params.formulation, params.start)
-        return replace(state, t=steps * self.period, steps=steps, run=run, of=key)
+            run = closed_loop.start_run(params.formulation, params.start)
+        return replace(state, t=steps * self.period, steps=steps, run=run, run_key=key)
 
     def edit(
         self, params: MpcStabilityParams, handle: str, point: tuple[float, float, float]
@@ -122,10 +122,12 @@ class MpcStability(Lab[MpcStabilityParams, MpcStabilityState]):
     ) -> Iterator[Snapshot | None]:
         """V* over the plane, coarse and then fine."""
         formulation = params.formulation
-        for iteration, size in enumerate(SIZES, 1):
+        for iteration, size in enumerate(RESOLUTIONS, 1):
             surface = yield from value_surface(formulation, size)
             done = (
-                "" if iteration < len(SIZES) and surface.V.size else _summary(formulation, surface)
+                ""
+                if iteration < len(RESOLUTIONS) and surface.V.size
+                else _summary(formulation, surface)
             )
             yield Snapshot(iteration, {"surface": surface}, done)
             if done:
@@ -146,7 +148,7 @@ class MpcStability(Lab[MpcStabilityParams, MpcStabilityState]):
             "v": float(run.x[1]),
             "q_ref": float(reference[0]),
             "v_ref": float(reference[1]),
-            "u": float(closed_loop.control(formulation, run)[0]),
+            "u": float(closed_loop.applied_control(formulation, run)[0]),
             "u_max": params.u_max,
             "u_min": -params.u_max,
         }
@@ -154,9 +156,9 @@ class MpcStability(Lab[MpcStabilityParams, MpcStabilityState]):
             measured["V"] = float(run.V[-1])
         if len(run.found) > 1 and run.found[-2:].all():
             measured["change"] = float(run.V[-1] - run.V[-2])
-            measured["minus_l"] = -float(run.paid[-2])
-        if len(run.excess):
-            measured["worst"] = float(run.excess.max())
+            measured["minus_l"] = -float(run.stage_costs[-2])
+        if len(run.decrease_excess):
+            measured["worst"] = float(run.decrease_excess.max())
         if state.surface.V.size:
             shares = 100.0 * state.surface.shares()
             measured |= {"falls": float(shares[FALLS]), "rises": float(shares[RISES])}
@@ -172,7 +174,7 @@ class MpcStability(Lab[MpcStabilityParams, MpcStabilityState]):
         return {**run_fields(state.run), **surface_fields(state.surface)}
 
     def notes(self, params: MpcStabilityParams, state: MpcStabilityState) -> Mapping[str, str]:
-        return {"assumptions": sentences(params.formulation), "run": _account(state.run)}
+        return {"assumptions": assumptions_note(params.formulation), "run": _run_note(state.run)}
 
     def labels(self, params: MpcStabilityParams) -> Mapping[str, str | tuple[str, ...]]:
         system = plane_system(params.system)
@@ -182,15 +184,15 @@ class MpcStability(Lab[MpcStabilityParams, MpcStabilityState]):
             "v_unit": v_unit,
             "u_unit": system.control_unit,
             "area_unit": f"{q_unit}·{v_unit}",
-            "changes": CHANGES,
+            "changes": CHANGE_NAMES,
         }
 
     def draw(self, scene: Scene, params: MpcStabilityParams, state: MpcStabilityState) -> None:
         """The plane with X_0, X_f, V* and the run, beside the body."""
-        picture.draw(scene, params.formulation, state.surface, state.run)
+        picture.draw_stability(scene, params.formulation, state.surface, state.run)
 
 
-def _key(params: MpcStabilityParams) -> str:
+def _run_key(params: MpcStabilityParams) -> str:
     """Of what a run depends on."""
     return repr((params.formulation.settings, params.q0, params.v0))
 
@@ -210,11 +212,11 @@ def _summary(formulation: Formulation, surface: ValueSurface) -> str:
     )
 
 
-def _account(run: ClosedLoopRun) -> str:
+def _run_note(run: ClosedLoopRun) -> str:
     """How the run fares."""
-    if run.ended or run.controller.status:
-        return "\n".join(filter(None, [run.controller.status, run.ended]))
+    if run.end_reason or run.controller.status:
+        return "\n".join(filter(None, [run.controller.status, run.end_reason]))
     count = run.controller.failures
     plans = run.controller.period - count
-    said = f"{counted(plans, 'plan')}, each solved to optimality."
-    return said if not count else f"{said} In {counted(count, 'period')} there was none."
+    said = f"{count_text(plans, 'plan')}, each solved to optimality."
+    return said if not count else f"{said} In {count_text(count, 'period')} there was none."

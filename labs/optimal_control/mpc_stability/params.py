@@ -6,8 +6,8 @@ import numpy as np
 
 from labs.optimal_control.mpc_stability.formulation import (
     PERIODS,
+    STABILITY_TASKS,
     SYSTEMS,
-    TASKS,
     TERMINAL_COSTS,
     TERMINAL_SETS,
     Formulation,
@@ -55,7 +55,7 @@ class MpcStabilityParams(Params):
         when=[{"terminal_cost": "p"}, {"terminal_set": "invariant"}],
     )
     """The terminal law u = K x is the best one for R times this; with 1 its P is Riccati's."""
-    task: str = PROBLEM.choice("regulate", TASKS, "Task", key=True)
+    task: str = PROBLEM.choice("regulate", STABILITY_TASKS, "Task", key=True)
     """What the controller is for."""
     amplitude: float = PROBLEM.knob(
         0.1, 0.0, 1.0, "a", "rad", "Amplitude", step=0.01, when={"task": "track"}, units=METRES

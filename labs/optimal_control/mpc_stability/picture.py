@@ -16,7 +16,7 @@ from labs.tasks.phase_plane.systems import plane_system
 
 HEIGHT = 0.5
 """[m] of the highest value that is drawn."""
-CEILING = 4.0
+MAX_HEIGHT_RATIO = 4.0
 """Times the median value: what is higher is cut off."""
 LEVELS = 6
 """Lines on the surface along which V* is the same."""
@@ -43,7 +43,9 @@ def plane_of(system: str) -> PhasePlane:
     return replace(plane, camera=CAMERAS[system], body_place=place)
 
 
-def draw(scene: Scene, formulation: Formulation, surface: ValueSurface, run: ClosedLoopRun) -> None:
+def draw_stability(
+    scene: Scene, formulation: Formulation, surface: ValueSurface, run: ClosedLoopRun
+) -> None:
     """All of it."""
     plane = plane_of(formulation.settings.system)
     plane.draw_axes(scene)
@@ -70,7 +72,7 @@ def _draw_surface(scene: Scene, plane: PhasePlane, surface: ValueSurface, scale:
     scene.surface("V", plane.place(points, lifts), COLORS[surface.change])
     if (np.diff(lifts, axis=0) >= 0.0).all():
         for number, height in enumerate(np.linspace(0.0, HEIGHT, LEVELS + 2)[1:-1], 1):
-            ways = _level(points, lifts, height)
+            ways = _level_line(points, lifts, height)
             if len(ways):
                 lift = height + 0.3 * LIFT
                 scene.trail(f"level {number}", plane.place(ways, lift), "muted", 0.8)
@@ -92,14 +94,14 @@ def _draw_run(
     elif len(run.path) >= 2 and not scale.known:
         plane.path(scene, "path", run.path + past, "force", layer=3)
     plan = run.controller.plan
-    if plan is not None and not run.controller.status and not run.ended:
+    if plan is not None and not run.controller.status and not run.end_reason:
         plane.path(scene, "plan", plan.X + past[-1], "actual", layer=2)
     here = np.clip(run.x, plane.lower, plane.upper)
     lift = scale.lift(run.V[-1:])[0] if scale.known and len(run.V) and on[-1] else 0.0
     scene.handle("state", plane.place(here, lift + LIFT), 0.035)
 
 
-def _level(points: np.ndarray, lifts: np.ndarray, height: float) -> np.ndarray:
+def _level_line(points: np.ndarray, lifts: np.ndarray, height: float) -> np.ndarray:
     """(m, 2, 2) pieces of the line on which the surface, which rises along every ray, is so high:
     between neighbouring rays that both get there."""
     ring = np.array(
@@ -120,7 +122,7 @@ class _Scale:
         self.known = bool(surface.V.size)
         values = surface.V if self.known else np.zeros(1)
         self.low = min(float(values.min()), 0.0)
-        ceiling = self.low + CEILING * float(np.median(values) - self.low)
+        ceiling = self.low + MAX_HEIGHT_RATIO * float(np.median(values) - self.low)
         self.high = min(float(values.max()), ceiling)
         self.span = max(self.high - self.low, 1e-9)
 

@@ -8,7 +8,7 @@ from labs.optimal_control.mpc_stability.closed_loop import ClosedLoopRun
 from labs.optimal_control.mpc_stability.value_surface import ValueSurface
 from labs.plots import Bars, Curves, Line, Note, Plot, Readout, ShownWhen, TimeSeries, Trace
 
-CHANGES = ("falls by l", "falls by less", "rises", "infeasible next")
+CHANGE_NAMES = ("falls by l", "falls by less", "rises", "infeasible next")
 
 AT_REST: ShownWhen = {"task": ("regulate", "economic")}
 
@@ -58,7 +58,7 @@ def run_fields(run: ClosedLoopRun) -> Mapping[str, np.ndarray]:
     has = run.found
     k = np.arange(len(run.V)) + (run.k + 1 - len(run.V))
     first = run.V[0] if len(run.V) and has[0] else 0.0
-    promised = first - np.concatenate([[0.0], np.cumsum(run.paid)])[: len(run.V)]
+    promised = first - np.concatenate([[0.0], np.cumsum(run.stage_costs)])[: len(run.V)]
     return {"k": k[has].astype(float), "V_run": run.V[has], "V_promised": promised[has]}
 
 

@@ -5,20 +5,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labs.algorithms.polygons import area, from_vertices
-from labs.optimal_control.mpc_stability.assumptions import to_edge
+from labs.algorithms.polygons import area, polyhedron_from_vertices
+from labs.optimal_control.mpc_stability.assumptions import boundary_points
 from labs.optimal_control.mpc_stability.formulation import Formulation
 from labs.resumable import Resumable
 
-SIZES = ((8, 25), (20, 61))
+RESOLUTIONS = ((8, 25), (20, 61))
 """Rings and rays, coarse and fine."""
 FALLS, FALLS_LESS, RISES, INFEASIBLE_NEXT = range(4)
 """By at least l; by less; not at all; there is no V*(x+)."""
-INSIDE = 1.0 - 1e-6
+EDGE_FRACTION = 1.0 - 1e-6
 """Of the way to the edge: there, but for rounding."""
 ROUNDING = 1e-7
 """Of 1 + V*."""
-FLAT = 1e-6
+MIN_AREA = 1e-6
 """Of the window: a smaller area of X_0 has no surface."""
 
 
@@ -34,7 +34,7 @@ class ValueSurface:
     """(rings, rays) FALLS ... INFEASIBLE_NEXT."""
 
     @classmethod
-    def nothing(cls) -> "ValueSurface":
+    def empty(cls) -> "ValueSurface":
         """Where it is not known, or X_0 has no inside."""
         return cls(np.zeros((0, 0, 2)), np.zeros((0, 0)), np.zeros((0, 0), dtype=int))
 
@@ -53,11 +53,11 @@ class ValueSurface:
 def value_surface(formulation: Formulation, size: tuple[int, int]) -> Resumable[ValueSurface]:
     """With rings and rays as in `size`."""
     corners, units = formulation.feasible_polygon, np.array(formulation.system.x_max)
-    if formulation.settings.task == "track" or area(corners) < FLAT * float(np.prod(units)):
-        return ValueSurface.nothing()
+    if formulation.settings.task == "track" or area(corners) < MIN_AREA * float(np.prod(units)):
+        return ValueSurface.empty()
     rings, rays = size
     angles = np.linspace(0.0, 2.0 * np.pi, rays)
-    edge = INSIDE * to_edge(from_vertices(corners), angles, units)
+    edge = EDGE_FRACTION * boundary_points(polyhedron_from_vertices(corners), angles, units)
     points = np.linspace(0.0, 1.0, rings)[:, None, None] * edge
     # Along a ray and back along the next: neighbours follow each other.
     order = points.transpose(1, 0, 2).copy()
@@ -75,10 +75,10 @@ def value_surface(formulation: Formulation, size: tuple[int, int]) -> Resumable[
         [INFEASIBLE_NEXT, RISES, FALLS],
         FALLS_LESS,
     )
-    return ValueSurface(points, _sorted_back(V, rings, rays), _sorted_back(change, rings, rays))
+    return ValueSurface(points, _restore_order(V, rings, rays), _restore_order(change, rings, rays))
 
 
-def _sorted_back(values: np.ndarray, rings: int, rays: int) -> np.ndarray:
+def _restore_order(values: np.ndarray, rings: int, rays: int) -> np.ndarray:
     """From the order of solving to (rings, rays)."""
     table = values.reshape(rays, rings).copy()
     table[1::2] = table[1::2, ::-1]

@@ -10,8 +10,8 @@ from labs.algorithms.chance_mpc import (
     Noise,
     back_off,
     error_covariances,
-    from_measured_state,
-    from_predicted_state,
+    nominal_from_measured_state,
+    nominal_from_predicted_state,
     stationary_covariance,
 )
 from labs.algorithms.invariant_sets import feasible_sets
@@ -19,25 +19,25 @@ from labs.algorithms.linear_mpc import LinearPlanner
 from labs.algorithms.polygons import minkowski_sum, vertices
 from labs.algorithms.riccati import steady_state
 from labs.algorithms.robust_invariant_set import robust_invariant_set
-from labs.algorithms.tube_mpc import TubePlanner, tightened
+from labs.algorithms.tube_mpc import TubePlanner, tighten_problem
 from labs.optimal_control.mpc_uncertainty.params import UncertaintyParams
 from labs.problems.linear_mpc import LinearMpcProblem
 from labs.problems.polyhedron import Polyhedron, box
 from labs.tasks.phase_plane.systems import plane_system
 
-T = 0.2
+CONTROL_PERIOD = 0.2
 """[s] a period."""
 GAIN_WEIGHTS = np.diag([10.0, 1.0])
 """[1/m^2, s^2/m^2] of the errors' position and velocity, for the gain K."""
-ERROR = 0.05
+TUBE_ERROR = 0.05
 """Of the tube, as a share of the disturbance."""
 LEFT_END = -1.5
 """[m] where the rail begins: the limit nobody comes near."""
-NAMES = ("nominal", "stochastic", "robust")
+CONTROLLER_NAMES = ("nominal", "stochastic", "robust")
 NOMINAL, STOCHASTIC, ROBUST = range(3)
-IRRELEVANT = {"shown": "all", "zoom": False, "count": 20.0, "seed": 0.0}
+FIELDS_OUTSIDE_DESIGN = {"shown": "all", "zoom": False, "count": 20.0, "seed": 0.0}
 """What controllers do not depend on."""
-WALL = 0
+WALL_ROW = 0
 """The row of X that is the wall."""
 
 
@@ -49,7 +49,7 @@ class Controllers:
     """(3,) of the nominal state."""
     K: np.ndarray
     """(1, 2)"""
-    ends: np.ndarray
+    final_position_limits: np.ndarray
     """(3,) [m] how far the last planned state may be."""
     tube: np.ndarray
     """(k, 2) corners of the tube's cross-section S."""
@@ -62,11 +62,13 @@ class Controllers:
 
     def margins(self) -> np.ndarray:
         """(3, N + 1) [m] how far before the wall each must plan to stay."""
-        wall = self.problems[NOMINAL].state_set.h[WALL]
-        margins = wall - np.tile(self.ends[:, None], (1, self.problems[NOMINAL].N + 1))
+        wall = self.problems[NOMINAL].state_set.h[WALL_ROW]
+        margins = wall - np.tile(
+            self.final_position_limits[:, None], (1, self.problems[NOMINAL].N + 1)
+        )
         for row, problem in zip(margins, self.problems, strict=True):
             if problem.state_margins is not None:
-                row[:-1] = problem.state_margins[:, WALL]
+                row[:-1] = problem.state_margins[:, WALL_ROW]
         return np.asarray(margins)
 
     @cached_property
@@ -80,12 +82,12 @@ class Controllers:
 
 def controllers(params: UncertaintyParams) -> Controllers:
     """Of these parameters; all have the same cost, and end at rest within their limits."""
-    return _controllers(params.model_copy(update=IRRELEVANT))
+    return _controllers(params.model_copy(update=FIELDS_OUTSIDE_DESIGN))
 
 
 @lru_cache(maxsize=4)
 def _controllers(params: UncertaintyParams) -> Controllers:
-    A, B, _ = plane_system("cart").linear(T)
+    A, B, _ = plane_system("cart").linear(CONTROL_PERIOD)
     Q, R = np.diag([params.q_p, params.q_v]), np.array([[params.r]])
     cost = steady_state(A, B, Q, R)
     K = steady_state(A, B, GAIN_WEIGHTS, np.array([[params.r_K]])).gain
@@ -97,38 +99,41 @@ def _controllers(params: UncertaintyParams) -> Controllers:
     noise = Noise(np.diag(params.deviation**2), K)
     p = params.probability / 100.0
     W = box(-params.w_max, params.w_max)
-    S = robust_invariant_set(A + B @ K, W, ERROR * float(params.w_max.min()))
+    S = robust_invariant_set(A + B @ K, W, TUBE_ERROR * float(params.w_max.min()))
     stationary = stationary_covariance(problem, noise)
     if params.source == "predicted":
-        cautious = from_predicted_state(problem, noise, p)
+        cautious = nominal_from_predicted_state(problem, noise, p)
         Sigma = np.tile(stationary, (problem.N + 1, 1, 1))
         end = cautious.state_set
     else:
-        cautious, Sigma = from_measured_state(problem, noise, p), error_covariances(problem, noise)
+        cautious, Sigma = (
+            nominal_from_measured_state(problem, noise, p),
+            error_covariances(problem, noise),
+        )
         end = Polyhedron(X.H, X.h - back_off(X, Sigma[-1], p))
-    tight = tightened(problem, S, K)
+    tight = tighten_problem(problem, S, K)
     ends = (X, end, tight.state_set)
     problems = [
-        _ending_at_rest(*pair) for pair in zip((problem, cautious, tight), ends, strict=True)
+        _require_final_rest(*pair) for pair in zip((problem, cautious, tight), ends, strict=True)
     ]
     return Controllers(
         problems=tuple(problems),
         K=K,
-        ends=np.array([limits.h[WALL] for limits in ends]),
+        final_position_limits=np.array([limits.h[WALL_ROW] for limits in ends]),
         tube=S.polygon(),
-        ellipses=_roots(Sigma) * ndtri(p),
+        ellipses=_matrix_square_roots(Sigma) * ndtri(p),
         planners=(LinearPlanner(problems[NOMINAL]), LinearPlanner(problems[STOCHASTIC])),
         tube_planner=TubePlanner(problems[ROBUST], S.polyhedron(), K),
     )
 
 
-def _roots(Sigma: np.ndarray) -> np.ndarray:
+def _matrix_square_roots(Sigma: np.ndarray) -> np.ndarray:
     """L with L L' = Sigma, of semidefinite (..., n, n)."""
     values, vectors = np.linalg.eigh(Sigma)
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :])
 
 
-def _ending_at_rest(problem: LinearMpcProblem, end: Polyhedron) -> LinearMpcProblem:
+def _require_final_rest(problem: LinearMpcProblem, end: Polyhedron) -> LinearMpcProblem:
     """With the last state at rest at a position of the set `end`, a box as X is: there it can stay
     for ever."""
     highest, _, lowest, _ = end.h

@@ -8,7 +8,11 @@ from typing import ClassVar
 import numpy as np
 
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
-from labs.optimal_control.mpc_uncertainty.controllers import NAMES, T, controllers
+from labs.optimal_control.mpc_uncertainty.controllers import (
+    CONTROL_PERIOD,
+    CONTROLLER_NAMES,
+    controllers,
+)
 from labs.optimal_control.mpc_uncertainty.params import UncertaintyParams
 from labs.optimal_control.mpc_uncertainty.picture import (
     CAMERA,
@@ -22,19 +26,19 @@ from labs.optimal_control.mpc_uncertainty.picture import (
 from labs.optimal_control.mpc_uncertainty.plots import (
     PLOTS,
     design_fields,
-    outcome,
-    promise,
-    readouts,
+    guarantee_note,
+    outcome_message,
     run_fields,
+    run_readouts,
 )
-from labs.optimal_control.mpc_uncertainty.runs import STEPS, DisturbedRuns, simulate
-from labs.optimal_control.mpc_uncertainty.statistics import Counts, count
+from labs.optimal_control.mpc_uncertainty.runs import RUN_STEPS, DisturbedRuns, simulate_runs
+from labs.optimal_control.mpc_uncertainty.statistics import Counts, run_statistics
 from labs.params import Value
 from labs.scene import Scene
 
-TICKS = 10
+TICKS_PER_STEP = 10
 """World steps in a period of the controllers."""
-REST = 60
+REST_TICKS = 60
 """World steps between the end of the runs and their start anew."""
 
 
@@ -60,7 +64,7 @@ class MpcUncertainty(Lab[UncertaintyParams, UncertaintyState]):
         "under nominal, stochastic and robust MPC, and what their caution costs."
     )
     Params = UncertaintyParams
-    period = T / TICKS
+    period = CONTROL_PERIOD / TICKS_PER_STEP
     plots = PLOTS
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Gaussian": {"kind": "gaussian"},
@@ -73,7 +77,7 @@ class MpcUncertainty(Lab[UncertaintyParams, UncertaintyState]):
     def init(self, params: UncertaintyParams, rng: np.random.Generator) -> UncertaintyState:
         """At the start; the disturbances have a seed of their own."""
         runs = DisturbedRuns.start(params)
-        return UncertaintyState(runs=runs, counts=count(params, controllers(params), runs))
+        return UncertaintyState(runs=runs, counts=run_statistics(params, controllers(params), runs))
 
     # The solver's clock -----------------------------------------------------------------------
 
@@ -83,21 +87,21 @@ class MpcUncertainty(Lab[UncertaintyParams, UncertaintyState]):
         """One step of all runs a snapshot."""
         chosen = controllers(params)
         yield None
-        for runs in simulate(params, chosen):
+        for runs in simulate_runs(params, chosen):
             if runs is None:
                 yield None
                 continue
-            counts = count(params, chosen, runs)
-            done = outcome(params, counts) if runs.steps == STEPS else ""
+            counts = run_statistics(params, chosen, runs)
+            done = outcome_message(params, counts) if runs.steps == RUN_STEPS else ""
             data = {"runs": runs, "counts": counts}
-            yield Snapshot(runs.steps, data, done, runs.steps / STEPS)
+            yield Snapshot(runs.steps, data, done, runs.steps / RUN_STEPS)
 
     def accept(
         self, params: UncertaintyParams, state: UncertaintyState, snapshot: Snapshot
     ) -> UncertaintyState:
         """The playing goes on, as far as there are runs to play."""
         runs = snapshot.data["runs"]
-        clock = min(state.clock, runs.steps * TICKS)
+        clock = min(state.clock, runs.steps * TICKS_PER_STEP)
         return replace(state, runs=runs, counts=snapshot.data["counts"], clock=clock)
 
     def edit(
@@ -116,7 +120,7 @@ class MpcUncertainty(Lab[UncertaintyParams, UncertaintyState]):
     ) -> UncertaintyState:
         """20 ms of all runs; at their end a rest, and then from the start."""
         steps, clock = state.steps + 1, state.clock + 1
-        if clock > STEPS * TICKS + REST:
+        if clock > RUN_STEPS * TICKS_PER_STEP + REST_TICKS:
             clock = 0
         return replace(state, t=steps * self.period, steps=steps, clock=clock)
 
@@ -124,7 +128,7 @@ class MpcUncertainty(Lab[UncertaintyParams, UncertaintyState]):
 
     def measure(self, params: UncertaintyParams, state: UncertaintyState) -> Measurement:
         """Shares of all runs, once they are complete."""
-        return readouts(params, state.runs, state.counts)
+        return run_readouts(params, state.runs, state.counts)
 
     def fields(
         self, params: UncertaintyParams, state: UncertaintyState
@@ -133,15 +137,15 @@ class MpcUncertainty(Lab[UncertaintyParams, UncertaintyState]):
         return design | run_fields(params, state.runs, state.counts)
 
     def notes(self, params: UncertaintyParams, state: UncertaintyState) -> Mapping[str, str]:
-        return {"promise": promise(params, controllers(params), state.runs, state.counts)}
+        return {"promise": guarantee_note(params, controllers(params), state.runs, state.counts)}
 
     def labels(self, params: UncertaintyParams) -> Mapping[str, str | tuple[str, ...]]:
-        return {"controllers": NAMES}
+        return {"controllers": CONTROLLER_NAMES}
 
     def draw(self, scene: Scene, params: UncertaintyParams, state: UncertaintyState) -> None:
         chosen, runs, plane = controllers(params), state.runs, phase_plane(params)
-        shown = [i for i, name in enumerate(NAMES) if params.shown in ("all", name)]
-        states, k = _playing(state)
+        shown = [i for i, name in enumerate(CONTROLLER_NAMES) if params.shown in ("all", name)]
+        states, k = _interpolate_runs(state)
         plane.draw_axes(scene)
         scene.camera(*CAMERA)
         draw_carts(scene, params, states[:, 0])
@@ -165,11 +169,11 @@ class MpcUncertainty(Lab[UncertaintyParams, UncertaintyState]):
             lab.fields(params, state)
 
 
-def _playing(state: UncertaintyState) -> tuple[np.ndarray, int]:
+def _interpolate_runs(state: UncertaintyState) -> tuple[np.ndarray, int]:
     """All states (3, runs, 2) now, on straight lines between steps, and the number of the step."""
-    X, ticks = state.runs.X, min(state.clock, state.runs.steps * TICKS)
-    k, tick = divmod(ticks, TICKS)
+    X, ticks = state.runs.X, min(state.clock, state.runs.steps * TICKS_PER_STEP)
+    k, tick = divmod(ticks, TICKS_PER_STEP)
     if not tick:
         return X[:, k], k
-    share = tick / TICKS
+    share = tick / TICKS_PER_STEP
     return (1.0 - share) * X[:, k] + share * X[:, k + 1], k

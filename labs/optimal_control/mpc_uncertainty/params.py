@@ -6,12 +6,12 @@ from labs.params import Group, Params
 
 RUN = Group("Runs", effect="solve")
 NOISE = Group("Disturbance", effect="solve")
-PROMISE = Group("Chance constraints", effect="solve")
+CHANCE_CONSTRAINTS = Group("Chance constraints", effect="solve")
 TASK = Group("Task and limits", effect="solve")
 MPC = Group("Controllers", effect="solve")
 VIEW = Group("View")
 
-KINDS = {
+DISTURBANCE_KINDS = {
     "uniform": "Uniform in W",
     "corners": "Corners of W, at random",
     "gaussian": "Gaussian",
@@ -28,7 +28,7 @@ SHOWN = {
 class UncertaintyParams(Params):
     """What the user can turn."""
 
-    kind: str = NOISE.choice("uniform", KINDS, "Disturbance", key=True)
+    kind: str = NOISE.choice("uniform", DISTURBANCE_KINDS, "Disturbance", key=True)
     """What is added to the state at each step, the same for all three controllers. The worst
     knows each run's gain K and pushes so that, without other control, it hits the wall hardest."""
     w_p: float = NOISE.knob(0.03, 0.002, 0.1, r"\bar w_p", "m", "Of the position", step=0.002)
@@ -43,9 +43,11 @@ class UncertaintyParams(Params):
     )  # fmt: skip
     """The standard deviation of a Gaussian disturbance is W's half width over this: robust MPC
     believes that nothing beyond so many deviations ever happens."""
-    probability: float = PROMISE.knob(90.0, 50.0, 99.9, "p", "%", "Probability", step=0.1, key=True)
+    probability: float = CHANCE_CONSTRAINTS.knob(
+        90.0, 50.0, 99.9, "p", "%", "Probability", step=0.1, key=True
+    )
     """With which stochastic MPC must keep each limit at each step."""
-    source: str = PROMISE.choice(
+    source: str = CHANCE_CONSTRAINTS.choice(
         "predicted",
         {"predicted": "The predicted state", "measured": "The measured state"},
         "Plan from",

@@ -6,7 +6,7 @@ import numpy as np
 
 from labs.models.mass_on_a_line import mass_on_a_line
 from labs.optimal_control.mpc_uncertainty.controllers import (
-    NAMES,
+    CONTROLLER_NAMES,
     NOMINAL,
     ROBUST,
     Controllers,
@@ -19,9 +19,9 @@ from labs.tasks.phase_plane.systems import plane_system
 
 COLORS: tuple[Color, ...] = ("actual", "reference", "force")
 BODIES: tuple[Vector3, ...] = (BLUE, ORANGE, (0.7, 0.16, 0.5))
-RAILS = (0.9, 0.45, 0.0)
+RAIL_POSITIONS = (0.9, 0.45, 0.0)
 """[m] their places along x."""
-NAMED = (-1.3, -0.8, -0.3)
+NAME_POSITIONS = (-1.3, -0.8, -0.3)
 """[m] where their names stand along y: one behind the other they would lie on each other."""
 LOWER, UPPER = np.array([-1.5, -1.1]), np.array([1.25, 1.1])
 """Of the plane."""
@@ -32,7 +32,9 @@ MIDDLE, HEIGHT = 1.4, 1.2
 CAMERA = ((4.2, -0.1, 2.1), (0.0, -0.1, 0.95))
 HALF_CART, SLAB, FLOOR, TOP = 0.1, 0.05, 0.48, 0.78
 """[m] of the cart, and of the slab of wall before it."""
-CIRCLE = np.stack([f(np.linspace(0.0, 2.0 * np.pi, 33)[:-1]) for f in (np.cos, np.sin)], axis=1)
+UNIT_CIRCLE = np.stack(
+    [f(np.linspace(0.0, 2.0 * np.pi, 33)[:-1]) for f in (np.cos, np.sin)], axis=1
+)
 
 
 def phase_plane(params: UncertaintyParams) -> PhasePlane:
@@ -47,7 +49,9 @@ def phase_plane(params: UncertaintyParams) -> PhasePlane:
 
 def draw_carts(scene: Scene, params: UncertaintyParams, first: np.ndarray) -> None:
     """The first run of each controller, at its state (3, 2), each with a wall of its own."""
-    for name, x, place, color, along in zip(NAMES, first, RAILS, BODIES, NAMED, strict=True):
+    for name, x, place, color, along in zip(
+        CONTROLLER_NAMES, first, RAIL_POSITIONS, BODIES, NAME_POSITIONS, strict=True
+    ):
         scene.arm(f"{name} cart", mass_on_a_line(place, color), x[:1])
         near = params.wall + HALF_CART
         corners = [(near, FLOOR), (near + SLAB, FLOOR), (near + SLAB, TOP), (near, TOP)]
@@ -70,7 +74,9 @@ def draw_sets(scene: Scene, plane: PhasePlane, chosen: Controllers, shown: list[
     """From where there are plans."""
     for i in shown:
         opacity = 0.12 if len(shown) == 1 else 0.05
-        plane.fill(scene, f"feasible, {NAMES[i]}", chosen.feasible[i], COLORS[i], opacity)
+        plane.fill(
+            scene, f"feasible, {CONTROLLER_NAMES[i]}", chosen.feasible[i], COLORS[i], opacity
+        )
 
 
 def draw_plan(
@@ -81,19 +87,23 @@ def draw_plan(
     plan: np.ndarray,
 ) -> None:
     """The first run's plan (N + 1, 2), with what the controller keeps clear of the limits."""
-    plane.path(scene, f"plan, {NAMES[i]}", plan, COLORS[i], layer=2)
+    plane.path(scene, f"plan, {CONTROLLER_NAMES[i]}", plan, COLORS[i], layer=2)
     if i == NOMINAL:
         return
     for k, z in enumerate(plan):
-        around = chosen.tube if i == ROBUST else CIRCLE @ chosen.ellipses[k].T
+        around = chosen.tube if i == ROBUST else UNIT_CIRCLE @ chosen.ellipses[k].T
         if len(around) and around.any():
-            plane.fill(scene, f"tube {k}, {NAMES[i]}", z + around, BODIES[i], 0.06, layer=1)
+            plane.fill(
+                scene, f"tube {k}, {CONTROLLER_NAMES[i]}", z + around, BODIES[i], 0.06, layer=1
+            )
             if k == 1:  # where the next state is expected
                 edge = np.vstack([z + around, z + around[:1]])
-                plane.path(scene, f"edge of tube, {NAMES[i]}", edge, "muted", layer=7)
+                plane.path(scene, f"edge of tube, {CONTROLLER_NAMES[i]}", edge, "muted", layer=7)
 
 
 def draw_runs(scene: Scene, plane: PhasePlane, states: np.ndarray, shown: list[int]) -> None:
     """All runs at their states (3, runs, 2)."""
     for i in shown:
-        plane.dots(scene, f"runs, {NAMES[i]}", states[i], COLORS[i], diameter=0.02, layer=3 + i)
+        plane.dots(
+            scene, f"runs, {CONTROLLER_NAMES[i]}", states[i], COLORS[i], diameter=0.02, layer=3 + i
+        )

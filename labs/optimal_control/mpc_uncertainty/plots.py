@@ -5,16 +5,20 @@ from typing import Literal
 import numpy as np
 
 from labs.optimal_control.mpc_uncertainty.controllers import (
-    NAMES,
+    CONTROL_PERIOD,
+    CONTROLLER_NAMES,
     NOMINAL,
     ROBUST,
     STOCHASTIC,
     Controllers,
-    T,
 )
 from labs.optimal_control.mpc_uncertainty.params import UncertaintyParams
-from labs.optimal_control.mpc_uncertainty.runs import STEPS, DisturbedRuns
-from labs.optimal_control.mpc_uncertainty.statistics import HELD, Counts, promised_interval
+from labs.optimal_control.mpc_uncertainty.runs import RUN_STEPS, DisturbedRuns
+from labs.optimal_control.mpc_uncertainty.statistics import (
+    ARRIVAL_STEP,
+    Counts,
+    confidence_interval,
+)
 from labs.plots import Bars, Curves, Note, Plot, Readout, Trace
 from labs.resumable import run_to_completion
 
@@ -24,11 +28,13 @@ SERIES = (1, 2, 4)
 CENTIMETRES = PERCENT = 100.0
 
 
-def by_controller(x: str, y: str, style: Style = "line", named: bool = True) -> tuple[Trace, ...]:
+def controller_traces(
+    x: str, y: str, style: Style = "line", named: bool = True
+) -> tuple[Trace, ...]:
     """A trace of each, where {} stands for its name."""
     return tuple(
         Trace(x.format(name), y.format(name), name if named else "", style, series)
-        for name, series in zip(NAMES, SERIES, strict=True)
+        for name, series in zip(CONTROLLER_NAMES, SERIES, strict=True)
     )
 
 
@@ -37,7 +43,7 @@ PLOTS: tuple[Plot, ...] = (
         "Beyond the wall",
         "time [s]",
         "runs [%]",
-        *by_controller("times", "beyond_{}"),
+        *controller_traces("times", "beyond_{}"),
         Trace("all_times", "promised_share", "promised", "dash"),
         Trace("all_times", "least", "", "dash", 7),
         Trace("all_times", "most", "95 % interval", "dash", 7),
@@ -46,8 +52,8 @@ PLOTS: tuple[Plot, ...] = (
         "Position at the wall",
         "time [s]",
         "beyond the wall [cm]",
-        *by_controller("held_times", "farthest_{}"),
-        *by_controller("held_times", "mean_{}", "dash", named=False),
+        *controller_traces("held_times", "farthest_{}"),
+        *controller_traces("held_times", "mean_{}", "dash", named=False),
         Trace("held_times", "wall", "wall", "dash"),
     ),
     Bars("Distance kept", "distance", r"p_{max} - \bar p", "cm", names="controllers"),
@@ -57,14 +63,14 @@ PLOTS: tuple[Plot, ...] = (
         "Feasible sets",
         "p [m]",
         "v [m/s]",
-        *by_controller("feasible_p_{}", "feasible_v_{}"),
+        *controller_traces("feasible_p_{}", "feasible_v_{}"),
         Trace("start_p", "start_v", "start", "points"),
     ),
     Curves(
         "Margin at the wall",
         "step of the plan",
         "margin [cm]",
-        *by_controller("planned_steps", "margin_{}", "marked"),
+        *controller_traces("planned_steps", "margin_{}", "marked"),
     ),
     Note("Promise and count", "promise"),
     Readout("risk", "Promised at most", "%"),
@@ -79,13 +85,13 @@ PLOTS: tuple[Plot, ...] = (
 def design_fields(params: UncertaintyParams, chosen: Controllers) -> dict[str, np.ndarray]:
     """What the three controllers plan with."""
     sets: dict[str, np.ndarray] = {}
-    for name, corners in zip(NAMES, chosen.feasible, strict=True):
+    for name, corners in zip(CONTROLLER_NAMES, chosen.feasible, strict=True):
         closed = np.vstack([corners, corners[:1]])
         sets |= {f"feasible_p_{name}": closed[:, 0], f"feasible_v_{name}": closed[:, 1]}
     margins = CENTIMETRES * chosen.margins()
     return (
         sets
-        | _by_name("margin", margins)
+        | _controller_fields("margin", margins)
         | {
             "planned_steps": np.arange(float(margins.shape[1])),
             "start_p": params.start[:1],
@@ -98,15 +104,15 @@ def run_fields(
     params: UncertaintyParams, runs: DisturbedRuns, counts: Counts
 ) -> dict[str, np.ndarray]:
     """What happened, and what was promised."""
-    low, high = promised_interval(params)
-    whole, ones = np.array([0.0, STEPS * T]), np.ones(2)
-    arrived = min(HELD, runs.steps)
+    low, high = confidence_interval(params)
+    whole, ones = np.array([0.0, RUN_STEPS * CONTROL_PERIOD]), np.ones(2)
+    arrived = min(ARRIVAL_STEP, runs.steps)
     away = CENTIMETRES * (runs.X[:, arrived:, :, 0] - params.wall)
-    times = T * np.arange(runs.steps + 1.0)
+    times = CONTROL_PERIOD * np.arange(runs.steps + 1.0)
     return (
-        _by_name("beyond", PERCENT * counts.beyond)
-        | _by_name("mean", away.mean(axis=2))
-        | _by_name("farthest", away.max(axis=2))
+        _controller_fields("beyond", PERCENT * counts.beyond)
+        | _controller_fields("mean", away.mean(axis=2))
+        | _controller_fields("farthest", away.max(axis=2))
         | {
             "times": times,
             "held_times": times[arrived:],
@@ -122,31 +128,33 @@ def run_fields(
     )
 
 
-def _by_name(what: str, rows: np.ndarray) -> dict[str, np.ndarray]:
-    return {f"{what}_{name}": row for name, row in zip(NAMES, rows, strict=True)}
+def _controller_fields(what: str, rows: np.ndarray) -> dict[str, np.ndarray]:
+    return {f"{what}_{name}": row for name, row in zip(CONTROLLER_NAMES, rows, strict=True)}
 
 
-def readouts(params: UncertaintyParams, runs: DisturbedRuns, counts: Counts) -> dict[str, float]:
+def run_readouts(
+    params: UncertaintyParams, runs: DisturbedRuns, counts: Counts
+) -> dict[str, float]:
     """Shares [%] of the runs beyond the wall, once they have arrived, and of plans not found."""
     shown = {"risk": 100.0 - params.probability}
-    if runs.steps < STEPS:
+    if runs.steps < RUN_STEPS:
         return shown
     held, unplanned = PERCENT * counts.held, PERCENT * counts.unplanned
-    shown |= {f"held_{name}": float(held[i]) for i, name in enumerate(NAMES)}
+    shown |= {f"held_{name}": float(held[i]) for i, name in enumerate(CONTROLLER_NAMES)}
     return shown | {
         "unplanned_nominal": float(unplanned[NOMINAL]),
         "unplanned_robust": float(unplanned[ROBUST]),
     }
 
 
-def promise(
+def guarantee_note(
     params: UncertaintyParams, chosen: Controllers, runs: DisturbedRuns, counts: Counts
 ) -> str:
     """What was promised, and what was counted."""
-    if runs.steps < STEPS:
+    if runs.steps < RUN_STEPS:
         return "The runs are not complete yet."
     total = round(params.count)
-    low, high = (share * total for share in promised_interval(params))
+    low, high = (share * total for share in confidence_interval(params))
     end = round(counts.beyond[STOCHASTIC, -1] * total)
     ever = [round(share * total) for share in counts.ever]
     robust = f"Robust MPC promises all steps, for w in W: {ever[ROBUST]} have been beyond."
@@ -164,10 +172,10 @@ def promise(
     )
 
 
-def outcome(params: UncertaintyParams, counts: Counts) -> str:
+def outcome_message(params: UncertaintyParams, counts: Counts) -> str:
     """Why the solver stopped, with what went wrong."""
-    said = f"{round(params.count)} runs of {STEPS} steps under each controller."
-    for name, share in zip(NAMES, counts.unplanned, strict=True):
+    said = f"{round(params.count)} runs of {RUN_STEPS} steps under each controller."
+    for name, share in zip(CONTROLLER_NAMES, counts.unplanned, strict=True):
         if share == 1.0:
             said += f" {name.capitalize()} MPC finds no plan: see Feasible sets."
     return said

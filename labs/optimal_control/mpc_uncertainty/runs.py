@@ -12,12 +12,12 @@ from labs.optimal_control.mpc_uncertainty.controllers import (
     STOCHASTIC,
     Controllers,
 )
-from labs.optimal_control.mpc_uncertainty.disturbances import disturbances
+from labs.optimal_control.mpc_uncertainty.disturbances import sample_disturbances
 from labs.optimal_control.mpc_uncertainty.params import UncertaintyParams
 from labs.problems.receding_horizon import Plan, Planner
 from labs.resumable import Resumable
 
-STEPS = 40
+RUN_STEPS = 40
 """Of a run: 8 s."""
 
 
@@ -58,14 +58,14 @@ class DisturbedRuns:
         return int(self.U.shape[1])
 
 
-def simulate(params: UncertaintyParams, chosen: Controllers) -> Iterator[DisturbedRuns | None]:
+def simulate_runs(params: UncertaintyParams, chosen: Controllers) -> Iterator[DisturbedRuns | None]:
     """The runs after each step; None in the midst of one. Where there is no plan, u = K (x - the
     place nearest to the target where the plan may stay); no force is above its limit."""
     problem, K = chosen.problems[NOMINAL], chosen.K[0]
-    w = disturbances(params, problem.A + problem.B @ chosen.K, STEPS)
-    rests = np.stack([np.minimum(chosen.ends, params.target), np.zeros(3)], axis=1)
+    w = sample_disturbances(params, problem.A + problem.B @ chosen.K, RUN_STEPS)
+    rests = np.stack([np.minimum(chosen.final_position_limits, params.target), np.zeros(3)], axis=1)
     runs, prediction = DisturbedRuns.start(params), None
-    for k in range(STEPS):
+    for k in range(RUN_STEPS):
         x = runs.X[:, -1]
         prediction = yield from _predict(params, chosen, prediction)
         u = yield from _controls(chosen, x, prediction)

@@ -7,10 +7,10 @@ from scipy.stats import binom
 
 from labs.optimal_control.mpc_uncertainty.controllers import NOMINAL, Controllers
 from labs.optimal_control.mpc_uncertainty.params import UncertaintyParams
-from labs.optimal_control.mpc_uncertainty.runs import STEPS, DisturbedRuns
+from labs.optimal_control.mpc_uncertainty.runs import RUN_STEPS, DisturbedRuns
 
 CONFIDENCE = 0.95
-HELD = STEPS // 2
+ARRIVAL_STEP = RUN_STEPS // 2
 """Step from which on the runs count as having arrived."""
 ROUNDING = 1e-9
 """[m]"""
@@ -25,7 +25,7 @@ class Counts:
     ever: np.ndarray
     """The share that ever was."""
     held: np.ndarray
-    """The share at a step, on average from step HELD on; NaN before."""
+    """The share at a step, on average from step ARRIVAL_STEP on; NaN before."""
     distance: np.ndarray
     """[m] mean distance from the wall, likewise."""
     cost: np.ndarray
@@ -34,13 +34,13 @@ class Counts:
     """The share of steps at which there was no plan."""
 
 
-def count(params: UncertaintyParams, chosen: Controllers, runs: DisturbedRuns) -> Counts:
+def run_statistics(params: UncertaintyParams, chosen: Controllers, runs: DisturbedRuns) -> Counts:
     """Over all runs so far."""
     problem = chosen.problems[NOMINAL]
     away = runs.X[:, :-1] - np.array([params.target, 0.0])
     stages = (away @ problem.Q * away).sum(axis=-1) + params.r * runs.U**2
     beyond = runs.X[..., 0] > params.wall + ROUNDING
-    arrived = min(HELD, runs.steps)
+    arrived = min(ARRIVAL_STEP, runs.steps)
     return Counts(
         beyond=beyond.mean(axis=2),
         ever=beyond.any(axis=1).mean(axis=1),
@@ -51,7 +51,7 @@ def count(params: UncertaintyParams, chosen: Controllers, runs: DisturbedRuns) -
     )
 
 
-def promised_interval(params: UncertaintyParams) -> tuple[float, float]:
+def confidence_interval(params: UncertaintyParams) -> tuple[float, float]:
     """Between which shares of the runs a count lies in 95 of 100 cases, if each is beyond with
     the probability promised."""
     runs, risk = round(params.count), 1.0 - params.probability / 100.0

@@ -11,7 +11,6 @@ from labs.algorithms import sqp
 from labs.algorithms.multiple_shooting import MultipleShooting
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot
 from labs.models.coordinates import coordinate_labels
-from labs.optimal_control.multiple_shooting.anatomy import Anatomy, anatomy
 from labs.optimal_control.multiple_shooting.params import MultipleShootingParams
 from labs.optimal_control.multiple_shooting.picture import draw_segments
 from labs.optimal_control.multiple_shooting.plots import (
@@ -20,6 +19,7 @@ from labs.optimal_control.multiple_shooting.plots import (
     segment_fields,
     study_fields,
 )
+from labs.optimal_control.multiple_shooting.structure import ShootingStructure, shooting_structure
 from labs.optimal_control.multiple_shooting.study import SegmentSweep, no_study, study_segments
 from labs.params import Value
 from labs.resumable import run_to_completion
@@ -27,19 +27,25 @@ from labs.scene import Scene
 from labs.tasks.direct.guesses import first_guess, start_guess
 from labs.tasks.direct.history import IterationHistory
 from labs.tasks.direct.motions import multiple_shooting_motion
-from labs.tasks.direct.picture import draw_goal, draw_now, draw_robots
+from labs.tasks.direct.picture import draw_current_position, draw_goal, draw_robots
 from labs.tasks.direct.plan_params import CHOICE_SETTINGS
-from labs.tasks.direct.player import DirectState, advanced, dragged, measured, replayed
-from labs.tasks.direct.tracking import playable
+from labs.tasks.direct.player import (
+    DirectState,
+    advance_player,
+    edit_balls,
+    measure_player,
+    play_motion,
+)
+from labs.tasks.direct.tracking import nominal_trajectory
 from labs.tasks.motion.playback import start_playback
-from labs.tasks.motion.player import PERIOD
+from labs.tasks.motion.player import WORLD_PERIOD
 
 
 @dataclass(kw_only=True)
 class MultipleShootingState(DirectState):
     """With the segments of its motion, and what was compared."""
 
-    anatomy: Anatomy
+    anatomy: ShootingStructure
     study: SegmentSweep
 
 
@@ -53,7 +59,7 @@ class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
         "that no motion follows, and balance where single shooting fails."
     )
     Params = MultipleShootingParams
-    period = PERIOD
+    period = WORLD_PERIOD
     plots = PLOTS
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Single shooting": {"segments": 1.0},
@@ -80,17 +86,17 @@ class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
         shooting, guess = params.shooting(params.m), first_guess(params, params.N)
         z = shooting.variables(guess.X, guess.U, guess.T)
         if not np.isfinite(shooting.values(z).f):
-            guess = params.resting()
+            guess = params.resting_guess()
             z = shooting.variables(guess.X, guess.U, guess.T)
         at, motion = sqp.init(shooting, z, params.options), multiple_shooting_motion(shooting, z)
-        plan = playable(params, motion)
+        plan = nominal_trajectory(params, motion)
         return MultipleShootingState(
             motion=motion,
             plan=plan,
             history=IterationHistory.start(params, at, motion),
             playback=start_playback(plan),
-            missed=np.zeros(0),
-            anatomy=run_to_completion(anatomy(shooting, z, params.task.u_0)),
+            goal_errors=np.zeros(0),
+            anatomy=run_to_completion(shooting_structure(shooting, z, params.task.u_0)),
             study=no_study(),
         )
 
@@ -103,20 +109,20 @@ class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
         shooting, options = params.shooting(params.m), params.options
         at = sqp.init(shooting, _initial_variables(params, shooting, state), options)
         if at.stopped:
-            yield Snapshot(1, _kept(state), at.stopped)
+            yield Snapshot(1, _failed_snapshot_data(state), at.stopped)
             return
         motion = multiple_shooting_motion(shooting, at.y)
         history = IterationHistory.start(params, at, motion)
         while not at.stopped:
-            at = yield from sqp.step_in_pieces(shooting, options, at)
+            at = yield from sqp.resumable_step(shooting, options, at)
             yield None
             motion = multiple_shooting_motion(shooting, at.y)
             history = history.append(params, at, motion)
             yield None
-            found = yield from anatomy(shooting, at.y, params.task.u_0)
+            found = yield from shooting_structure(shooting, at.y, params.task.u_0)
             data = {
                 "motion": motion,
-                "plan": playable(params, motion),
+                "plan": nominal_trajectory(params, motion),
                 "history": history,
                 "failed": bool(at.stopped) and not at.converged,
                 "reusable": at.reusable,
@@ -126,7 +132,7 @@ class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
             if not (at.stopped and params.compares):
                 yield Snapshot(at.iteration, data, at.stopped)
         if params.compares:
-            yield from _compared(params, Snapshot(at.iteration, data, at.stopped))
+            yield from _compare_segments(params, Snapshot(at.iteration, data, at.stopped))
 
     def accept(
         self, params: MultipleShootingParams, state: MultipleShootingState, snapshot: Snapshot
@@ -134,7 +140,7 @@ class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
         """Whatever is taken in is played from its start."""
         data = snapshot.data
         parts = (data[name] for name in ("motion", "plan", "history", "failed"))
-        state = replayed(state, *parts)
+        state = play_motion(state, *parts)
         own = {name: data[name] for name in ("anatomy", "study", "reusable")}
         return replace(state, **own)
 
@@ -142,7 +148,7 @@ class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
         self, params: MultipleShootingParams, handle: str, point: tuple[float, float, float]
     ) -> Mapping[str, Value]:
         """The balls are the target and the obstacle of the UR5."""
-        return dragged(params, handle, point)
+        return edit_balls(params, handle, point)
 
     # The world's clock ------------------------------------------------------------------------
 
@@ -150,14 +156,14 @@ class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
         self, params: MultipleShootingParams, inputs: Inputs, state: MultipleShootingState
     ) -> MultipleShootingState:
         """10 ms of the motion; at its end a rest, and then from the start."""
-        return advanced(params, state)
+        return advance_player(params, state)
 
     # What is shown ----------------------------------------------------------------------------
 
     def measure(self, params: MultipleShootingParams, state: MultipleShootingState) -> Measurement:
         """Where both runs are beside the plan, and numbers of the solve."""
         at = state.anatomy
-        found = measured(params, state) | {
+        found = measure_player(params, state) | {
             "variables": float(at.variables),
             "nonzeros": float(at.nonzeros),
             "density": 100.0 * at.density,
@@ -190,7 +196,7 @@ class MultipleShootingLab(Lab[MultipleShootingParams, MultipleShootingState]):
         draw_goal(scene, params)
         bead = 0.016 if params.task.planar else 0.009
         draw_segments(scene, state.history, state.anatomy, state.failed, bead)
-        draw_now(scene, params, state)
+        draw_current_position(scene, params, state)
 
     @classmethod
     def prepare(cls) -> None:
@@ -211,7 +217,7 @@ def _initial_variables(
     return shooting.variables(guess.X, guess.U, guess.T)
 
 
-def _compared(params: MultipleShootingParams, last: Snapshot) -> Iterator[Snapshot | None]:
+def _compare_segments(params: MultipleShootingParams, last: Snapshot) -> Iterator[Snapshot | None]:
     """The solver's last snapshot, and one more for each other number of segments; the sentence
     with the last of all."""
     yield replace(last, done="")
@@ -225,7 +231,7 @@ def _compared(params: MultipleShootingParams, last: Snapshot) -> Iterator[Snapsh
     yield Snapshot(count + 1, {**last.data, "study": latest}, last.done)
 
 
-def _kept(state: MultipleShootingState) -> dict[str, Any]:
+def _failed_snapshot_data(state: MultipleShootingState) -> dict[str, Any]:
     """What there is already, where the first guess diverges."""
     names = ("motion", "plan", "history", "anatomy", "study")
     kept = {name: getattr(state, name) for name in names}

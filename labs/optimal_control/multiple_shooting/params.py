@@ -7,9 +7,9 @@ from labs.algorithms.shooting_steps import SHOOTING_METHODS
 from labs.params import Group
 from labs.tasks.direct.guesses import Guess
 from labs.tasks.direct.params import DirectParams
-from labs.tasks.direct.plan_params import LIGHT
+from labs.tasks.direct.plan_params import LIGHT_SYSTEMS
 
-MOST_PIECES, MOST_STEPS = 40, 4
+MAX_PIECES, MAX_STEPS = 40, 4
 
 SHOOTING = Group("Shooting", effect="solve")
 
@@ -17,12 +17,12 @@ SHOOTING = Group("Shooting", effect="solve")
 class MultipleShootingParams(DirectParams):
     """What the user can turn."""
 
-    segments: float = SHOOTING.knob(10.0, 1.0, MOST_PIECES, "m", "", "Segments", step=1.0, key=True)
+    segments: float = SHOOTING.knob(10.0, 1.0, MAX_PIECES, "m", "", "Segments", step=1.0, key=True)
     """How often the integration begins anew: 1 is single shooting; at most one a piece."""
-    pieces: float = SHOOTING.knob(20.0, 2.0, MOST_PIECES, "N", "", "Pieces", step=1.0, key=True)
+    pieces: float = SHOOTING.knob(20.0, 2.0, MAX_PIECES, "N", "", "Pieces", step=1.0, key=True)
     """How many pieces the control is held on, split evenly among the segments."""
     steps: float = SHOOTING.knob(
-        2.0, 1.0, MOST_STEPS, "M", "", "Steps a piece", step=1.0, when={"system": LIGHT}
+        2.0, 1.0, MAX_STEPS, "M", "", "Steps a piece", step=1.0, when={"system": LIGHT_SYSTEMS}
     )
     """Steps of integration in each piece. They add no variables. Of the UR5 it is one."""
     integrator: str = SHOOTING.choice(
@@ -33,7 +33,7 @@ class MultipleShootingParams(DirectParams):
         "none",
         {"none": "None", "segments": "Other numbers of segments"},
         "Compare",
-        when={"system": LIGHT},
+        when={"system": LIGHT_SYSTEMS},
     )
     """What is solved besides: the same problem from the same guess with 1, 2, 4, ... segments."""
 
@@ -48,17 +48,17 @@ class MultipleShootingParams(DirectParams):
 
     @property
     def M(self) -> int:
-        return round(self.steps) if self.system in LIGHT else 1
+        return round(self.steps) if self.system in LIGHT_SYSTEMS else 1
 
     @property
     def compares(self) -> bool:
-        return self.study == "segments" and self.system in LIGHT
+        return self.study == "segments" and self.system in LIGHT_SYSTEMS
 
     def shooting(self, m: int) -> MultipleShooting:
         """The programme with m segments."""
         return MultipleShooting(self.problem, self.N, m, self.M, self.integrator)
 
-    def resting(self) -> Guess:
+    def resting_guess(self) -> Guess:
         """Where it starts, held there: what diverges from nowhere."""
         at = self.task
         X, U = np.tile(at.x0, (self.N + 1, 1)), np.tile(at.holding, (self.N, 1))

@@ -4,17 +4,17 @@ from itertools import pairwise
 
 import numpy as np
 
-from labs.optimal_control.multiple_shooting.anatomy import Anatomy
+from labs.optimal_control.multiple_shooting.structure import ShootingStructure
 from labs.scene import Color, Scene
 from labs.tasks.direct.history import IterationHistory
-from labs.tasks.direct.picture import OPEN
+from labs.tasks.direct.picture import GAP_TOLERANCE
 
 COLORS: tuple[Color, Color] = ("reference", "actual")
 """Of segments in turn."""
 
 
 def draw_segments(
-    scene: Scene, history: IterationHistory, at: Anatomy, failed: bool, bead: float
+    scene: Scene, history: IterationHistory, at: ShootingStructure, failed: bool, bead: float
 ) -> None:
     """Each from a bead of this radius [m] at its start; a line to the next where there is a gap."""
     tips = history.tips[-1]
@@ -23,5 +23,5 @@ def draw_segments(
         path = tips[begin:end].reshape(-1, 3)
         scene.trail(f"segment {i + 1}", path, color)
         scene.sphere(f"start {i + 1}", path[0], bead, color)
-        if end < len(tips) and np.linalg.norm(tips[end, 0] - path[-1]) > OPEN:
+        if end < len(tips) and np.linalg.norm(tips[end, 0] - path[-1]) > GAP_TOLERANCE:
             scene.trail(f"gap {i + 1}", np.stack([path[-1], tips[end, 0]]), "muted")

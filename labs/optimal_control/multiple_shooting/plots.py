@@ -4,16 +4,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from labs.optimal_control.multiple_shooting.anatomy import Anatomy
+from labs.optimal_control.multiple_shooting.structure import ShootingStructure
 from labs.optimal_control.multiple_shooting.study import SegmentSweep
 from labs.plots import Curves, HeatMap, Plot, Readout, Trace
 from labs.tasks.direct.history import IterationHistory
-from labs.tasks.direct.plan_params import LIGHT
-from labs.tasks.direct.plots import control_played, position_played
+from labs.tasks.direct.plan_params import LIGHT_SYSTEMS
+from labs.tasks.direct.plots import control_plot, position_plot
 
 ROUNDING = 1e-12
 """Constraints that are off by less are met: a logarithmic axis leaves that out."""
-SEGMENTS = {"study": ("segments",), "system": LIGHT}
+WITH_SEGMENT_STUDY = {"study": ("segments",), "system": LIGHT_SYSTEMS}
 
 PLOTS: tuple[Plot, ...] = (
     Curves(
@@ -76,7 +76,7 @@ PLOTS: tuple[Plot, ...] = (
         Trace("solved_m", "solved_iterations", "converged", "marked", 1),
         Trace("failed_m", "failed_iterations", "stopped without a solution", "points", 2),
         log_x=True,
-        when=SEGMENTS,
+        when=WITH_SEGMENT_STUDY,
     ),
     Curves(
         "Cost by segments",
@@ -84,7 +84,7 @@ PLOTS: tuple[Plot, ...] = (
         "cost",
         Trace("solved_m", "solved_cost", "converged", "marked", 1),
         log_x=True,
-        when=SEGMENTS,
+        when=WITH_SEGMENT_STUDY,
     ),
     Curves(
         "Size by segments",
@@ -94,10 +94,10 @@ PLOTS: tuple[Plot, ...] = (
         Trace("all_m", "all_nonzeros", "nonzeros", "marked", 2),
         log_x=True,
         log_y=True,
-        when=SEGMENTS,
+        when=WITH_SEGMENT_STUDY,
     ),
-    position_played(),
-    control_played(),
+    position_plot(),
+    control_plot(),
     Readout("cost", "Cost J", ""),
     Readout("iteration", "Iterations", "", whole=True),
     Readout("largest_gap", "Largest gap", ""),
@@ -131,22 +131,24 @@ def iteration_fields(history: IterationHistory, cuts: np.ndarray) -> dict[str, n
     }
 
 
-def segment_fields(history: IterationHistory, at: Anatomy, T: float) -> dict[str, np.ndarray]:
+def segment_fields(
+    history: IterationHistory, at: ShootingStructure, T: float
+) -> dict[str, np.ndarray]:
     """The segments in the phase plane, and what a deviation becomes in them."""
     h, phases = T / len(at.growth), history.phases[-1]
     between = list(pairwise(at.cuts))
     arcs = [phases[i:j].reshape(-1, 2) for i, j in between]
     growth = [np.concatenate([[1.0], at.growth[i:j]]) for i, j in between]
     times = [h * np.arange(i, j + 1) for i, j in between]
-    arc_q, arc_v = (_columns([arc[:, k] for arc in arcs]) for k in (0, 1))
+    arc_q, arc_v = (_pad_columns([arc[:, k] for arc in arcs]) for k in (0, 1))
     return {
         "arc_q": arc_q,
         "arc_v": arc_v,
         "start_q": arc_q[0],
         "start_v": arc_v[0],
         "gap_t": h * at.cuts[1:-1],
-        "growth_t": _columns(times),
-        "growth": _columns(growth),
+        "growth_t": _pad_columns(times),
+        "growth": _pad_columns(growth),
         "whole_t": h * np.arange(len(at.growth) + 1),
         "whole": np.concatenate([[1.0], at.growth_whole]),
         "row": np.arange(len(at.pattern), dtype=float),
@@ -170,7 +172,7 @@ def study_fields(study: SegmentSweep) -> dict[str, np.ndarray]:
     }
 
 
-def _columns(curves: list[np.ndarray]) -> np.ndarray:
+def _pad_columns(curves: list[np.ndarray]) -> np.ndarray:
     """(points, k) of k curves, shorter ones resting at their end."""
     longest = max(len(curve) for curve in curves)
     return np.stack([np.pad(curve, (0, longest - len(curve)), "edge") for curve in curves], axis=1)

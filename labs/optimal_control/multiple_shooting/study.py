@@ -10,9 +10,9 @@ from labs.optimal_control.multiple_shooting.params import MultipleShootingParams
 from labs.resumable import run_to_completion
 from labs.tasks.direct.guesses import first_guess
 
-MOST_ITERATIONS = 40
+MAX_ITERATIONS = 40
 """For each of them."""
-PARTS = (1, 2, 4, 5, 10, 20, 40)
+SEGMENT_COUNTS = (1, 2, 4, 5, 10, 20, 40)
 """Numbers of segments that are tried, as far as there are pieces; and N."""
 
 
@@ -45,8 +45,8 @@ def study_segments(params: MultipleShootingParams) -> Iterator[SegmentSweep | No
     what is known after each of them, and None in between."""
     rows: list[tuple[float, ...]] = []
     guess = first_guess(params, params.N)
-    options = sqp.SqpOptions(hessian=params.hessian, iterations=MOST_ITERATIONS)
-    for m in sorted({m for m in PARTS if m < params.N} | {params.N}, reverse=True):
+    options = sqp.SqpOptions(hessian=params.hessian, iterations=MAX_ITERATIONS)
+    for m in sorted({m for m in SEGMENT_COUNTS if m < params.N} | {params.N}, reverse=True):
         shooting = params.shooting(m)
         at = sqp.init(shooting, shooting.variables(guess.X, guess.U, guess.T), options)
         while not at.stopped:

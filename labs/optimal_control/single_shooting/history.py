@@ -7,7 +7,7 @@ import numpy as np
 
 from labs.algorithms.sqp import SqpIterate
 
-KEPT = 7
+KEPT_PATHS = 7
 """Iterations whose paths are drawn."""
 
 
@@ -24,12 +24,12 @@ class ShootingHistory:
     alpha: np.ndarray
     """(k,) the step lengths."""
     paths: np.ndarray
-    """(KEPT, points, 3) [m] of the tip, the newest last."""
+    """(KEPT_PATHS, points, 3) [m] of the tip, the newest last."""
 
     @classmethod
     def start(cls, at: SqpIterate, path: np.ndarray) -> Self:
         """Of a first guess with its path (points, 3)."""
-        none, paths = np.zeros(0), np.tile(path, (KEPT, 1, 1))
+        none, paths = np.zeros(0), np.tile(path, (KEPT_PATHS, 1, 1))
         return cls(np.array([at.values.f]), np.array([at.violation]), none, none, paths)
 
     def append(self, at: SqpIterate, path: np.ndarray) -> Self:

@@ -18,9 +18,9 @@ from labs.optimal_control.single_shooting.picture import (
     draw_change,
     draw_paths,
     draw_robots,
-    world_line,
+    drawn_path,
 )
-from labs.optimal_control.single_shooting.plan import ShootingPlan, make_plan, state_at
+from labs.optimal_control.single_shooting.plan import ShootingPlan, interpolate_state, make_plan
 from labs.optimal_control.single_shooting.plots import (
     PLOTS,
     change_fields,
@@ -36,10 +36,10 @@ from labs.optimal_control.single_shooting.studies import (
 )
 from labs.params import Value
 from labs.scene import Scene
-from labs.tasks.direct.guesses import warm
+from labs.tasks.direct.guesses import is_warm_start
 from labs.tasks.direct.picture import draw_goal
-from labs.tasks.direct.player import dragged, labels_of
-from labs.tasks.motion.player import PERIOD, REST_STEPS
+from labs.tasks.direct.player import edit_balls, plan_labels
+from labs.tasks.motion.player import REST_STEPS, WORLD_PERIOD
 
 
 @dataclass(kw_only=True)
@@ -55,7 +55,7 @@ class SingleShootingState(State):
     """Whether a change may be solved from the plan: it is of a solve that did not fail."""
     clock: int = 0
     """World steps since the motion began; it ends and rests, then begins anew."""
-    grown: float = 0.0
+    shown_fraction: float = 0.0
     """The part of the motion that has been seen since the start: so much of the map is shown."""
     steps: int = 0
     """World steps done: t = steps * period."""
@@ -72,7 +72,7 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
         "see sensitivities explode, and get a gradient in three ways."
     )
     Params = SingleShootingParams
-    period = PERIOD
+    period = WORLD_PERIOD
     plots = PLOTS
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Mass": {"system": "mass"},
@@ -117,7 +117,7 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
         shooting, seconds, study = params.shooting, dict[str, Any](), NO_STUDY
         at = sqp.init(shooting, _initial_variables(params, shooting, state), params.options)
         if at.stopped:
-            why = at.stopped if np.isfinite(at.values.f) else _divergence(shooting, at.y)
+            why = at.stopped if np.isfinite(at.values.f) else _divergence_message(shooting, at.y)
             kept = _snapshot_data(state.plan, state.history, state.study, at, {})
             yield Snapshot(1, kept, why)
             return
@@ -125,7 +125,7 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
             study = yield from study_gradients(params, seconds)
         history = ShootingHistory.start(at, _path(params, make_plan(params, shooting, at.y)))
         while not at.stopped:
-            at = yield from sqp.step_in_pieces(shooting, params.options, at)
+            at = yield from sqp.resumable_step(shooting, params.options, at)
             yield None
             plan = make_plan(params, shooting, at.y)
             history = history.append(at, _path(params, plan))
@@ -155,7 +155,7 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
         """One ball is the change of one control; the others are the UR5's target and obstacle."""
         if handle == "control":
             return dragged_control(params, point)
-        return dragged(params, handle, point)
+        return edit_balls(params, handle, point)
 
     # The world's clock ------------------------------------------------------------------------
 
@@ -166,8 +166,8 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
         steps, clock = state.steps + 1, state.clock + 1
         if (clock - REST_STEPS) * self.period > state.plan.T:
             clock = 0
-        grown = max(state.grown, min(clock * self.period / state.plan.T, 1.0))
-        return replace(state, t=steps * self.period, steps=steps, clock=clock, grown=grown)
+        grown = max(state.shown_fraction, min(clock * self.period / state.plan.T, 1.0))
+        return replace(state, t=steps * self.period, steps=steps, clock=clock, shown_fraction=grown)
 
     # What is shown ----------------------------------------------------------------------------
 
@@ -175,10 +175,10 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
         """Where the simulated motion is, and numbers of the plan."""
         plan, n, t = state.plan, params.task.mechanism.nq, self._motion_time(state)
         piece = min(int(t / plan.T * plan.N), plan.N - 1)
-        X, U = plan.played(params.feedback)
+        X, U = plan.simulated_run(params.feedback)
         measured: dict[str, float | np.ndarray] = {
-            "q": state_at(X, plan.T, t)[:n],
-            "q_plan": state_at(plan.X, plan.T, t)[:n],
+            "q": interpolate_state(X, plan.T, t)[:n],
+            "q_plan": interpolate_state(plan.X, plan.T, t)[:n],
             "u": U[piece],
             "cost": float(state.history.cost[-1]),
             "iteration": float(len(state.history.alpha)),
@@ -195,13 +195,13 @@ class SingleShootingLab(Lab[SingleShootingParams, SingleShootingState]):
         """The iterations, the map of sensitivities, the changed motion and the studies."""
         return (
             iteration_fields(state.history)
-            | sensitivity_fields(state.plan, params.chosen, state.grown)
+            | sensitivity_fields(state.plan, params.chosen_piece, state.shown_fraction)
             | change_fields(params, state.plan)
             | study_fields(state.study, state.seconds)
         )
 
     def labels(self, params: SingleShootingParams) -> Mapping[str, str | tuple[str, ...]]:
-        return labels_of(params)
+        return plan_labels(params)
 
     def draw(self, scene: Scene, params: SingleShootingParams, state: SingleShootingState) -> None:
         """The robot, its ghost under the changed control, the paths, and the goal."""
@@ -233,14 +233,14 @@ def _initial_variables(
     """y to start from: the present solution, if there is one and it is wanted. Its controls are
     taken at the middles of the new pieces, in parts of the motion."""
     plan = state.plan
-    if not warm(params, state.reusable):
+    if not is_warm_start(params, state.reusable):
         return shooting.pack(params.first_guess(params.N))
     middle = (np.arange(params.N) + 0.5) / params.N
     U = plan.U[(middle * plan.N).astype(int)]
     return shooting.pack(U, plan.T)
 
 
-def _divergence(shooting: SingleShooting, y: np.ndarray) -> str:
+def _divergence_message(shooting: SingleShooting, y: np.ndarray) -> str:
     step, t = shooting.diverges_at(y)
     return (
         f"The first guess diverges in step {step} of {shooting.N * shooting.M}, at t = {t:.3g} s: "
@@ -249,7 +249,7 @@ def _divergence(shooting: SingleShooting, y: np.ndarray) -> str:
 
 
 def _path(params: SingleShootingParams, plan: ShootingPlan) -> np.ndarray:
-    return world_line(params.task, plan.X, plan.T)
+    return drawn_path(params.task, plan.X, plan.T)
 
 
 def _snapshot_data(

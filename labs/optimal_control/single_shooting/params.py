@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from labs.algorithms.shooting_steps import FORMS, SHOOTING_METHODS, CostForm
+from labs.algorithms.shooting_steps import COST_FORMS, SHOOTING_METHODS, CostForm
 from labs.algorithms.single_shooting import SingleShooting
 from labs.algorithms.sqp_iterate import HESSIANS
 from labs.lab import ChoiceSettings
 from labs.params import Group
-from labs.tasks.direct.plan_params import LIGHT, SOLVER, PlanParams
+from labs.tasks.direct.plan_params import LIGHT_SYSTEMS, SOLVER, PlanParams
 
-MOST_PIECES, MOST_STEPS = 60, 8
-MOST_HEAVY_PIECES = 12
+MAX_PIECES, MAX_STEPS = 60, 8
+MAX_HEAVY_PIECES = 12
 """Of the UR5, whose derivatives cost more."""
 
 CHOICE_SETTINGS: ChoiceSettings = {
@@ -29,10 +29,18 @@ WORLD = Group("World")
 class SingleShootingParams(PlanParams):
     """What the user can turn."""
 
-    pieces: float = SHOOTING.knob(20.0, 2.0, MOST_PIECES, "N", "", "Pieces", step=1.0, key=True)
+    pieces: float = SHOOTING.knob(20.0, 2.0, MAX_PIECES, "N", "", "Pieces", step=1.0, key=True)
     """How many pieces the control is held on: the variables; of the UR5 at most 12."""
     steps: float = SHOOTING.knob(
-        2.0, 1.0, MOST_STEPS, "M", "", "Steps a piece", step=1.0, key=True, when={"system": LIGHT}
+        2.0,
+        1.0,
+        MAX_STEPS,
+        "M",
+        "",
+        "Steps a piece",
+        step=1.0,
+        key=True,
+        when={"system": LIGHT_SYSTEMS},
     )
     """Steps of integration in each piece: the accuracy of x. Of the UR5 it is one."""
     integrator: str = SHOOTING.choice(
@@ -50,7 +58,7 @@ class SingleShootingParams(PlanParams):
     """How the integral of l is computed."""
 
     piece: float = ONE_CONTROL.knob(
-        1.0, 1.0, MOST_PIECES, "k", "", "Changed piece", step=1.0, key=True
+        1.0, 1.0, MAX_PIECES, "k", "", "Changed piece", step=1.0, key=True
     )
     """The piece whose control is changed; or drag the ball in the scene."""
     delta: float = ONE_CONTROL.knob(
@@ -76,7 +84,7 @@ class SingleShootingParams(PlanParams):
             "integration": "Errors, over M",
         },
         "Measure also",
-        when={"system": LIGHT},
+        when={"system": LIGHT_SYSTEMS},
     )
     """What is measured besides: at the first guess the gradient, by sensitivities, adjoint and
     finite differences; of the solution the error of state and cost over M."""
@@ -84,19 +92,19 @@ class SingleShootingParams(PlanParams):
     @property
     def N(self) -> int:
         N = round(self.pieces)
-        return N if self.system in LIGHT else min(N, MOST_HEAVY_PIECES)
+        return N if self.system in LIGHT_SYSTEMS else min(N, MAX_HEAVY_PIECES)
 
     @property
     def M(self) -> int:
-        return round(self.steps) if self.system in LIGHT else 1
+        return round(self.steps) if self.system in LIGHT_SYSTEMS else 1
 
     @property
     def studied(self) -> str:
         """What is measured besides."""
-        return self.study if self.system in LIGHT else "none"
+        return self.study if self.system in LIGHT_SYSTEMS else "none"
 
     @property
-    def chosen(self) -> int:
+    def chosen_piece(self) -> int:
         """The piece whose control is changed, from 0."""
         return min(round(self.piece), self.N) - 1
 
@@ -109,7 +117,7 @@ class SingleShootingParams(PlanParams):
         self, N: int, M: int, integrator: str, form: CostForm | None = None
     ) -> SingleShooting:
         """The problem with other pieces, steps and methods."""
-        chosen = next(known for known in FORMS if known == self.form)
+        chosen = next(known for known in COST_FORMS if known == self.form)
         return SingleShooting(self.problem, N, M, integrator, form or chosen)
 
     def first_guess(self, N: int) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 
 from labs.algorithms.single_shooting import SingleShooting
 from labs.optimal_control.single_shooting.params import SingleShootingParams
-from labs.optimal_control.single_shooting.simulation import simulate, tracking_gains
+from labs.optimal_control.single_shooting.simulation import simulate_plan, tracking_gains
 from labs.problems.optimal_control import LARGEST_STATE
 
 LARGEST_CONDITION = 1e15
@@ -50,12 +50,12 @@ class ShootingPlan:
         """|x(T) planned - simulated|."""
         return float(np.linalg.norm(self.X[-1] - self.simulated[-1]))
 
-    def played(self, feedback: bool) -> tuple[np.ndarray, np.ndarray]:
+    def simulated_run(self, feedback: bool) -> tuple[np.ndarray, np.ndarray]:
         """States and controls of the simulation, with feedback or without."""
         return (self.tracked, self.tracked_U) if feedback else (self.simulated, self.U)
 
 
-def state_at(X: np.ndarray, T: float, t: float) -> np.ndarray:
+def interpolate_state(X: np.ndarray, T: float, t: float) -> np.ndarray:
     """x (nx,) at t [s] on the even grid X (k + 1, nx) over [0, T], linear in between."""
     place = min(max(t / T, 0.0), 1.0) * (len(X) - 1)
     j = min(int(place), len(X) - 2)
@@ -75,20 +75,20 @@ def make_plan(
     end = shooting.end_sensitivities(y, S)[:, : N * nu] * scale
     U, X = shooting.controls(y).copy(), shooting.rollout(y).X
     nodes, K = X[:: shooting.M], tracking_gains(at, N, u_0)
-    simulated, _ = simulate(params.task, nodes, U, np.zeros_like(K), T)
+    simulated, _ = simulate_plan(params.task, nodes, U, np.zeros_like(K), T)
     return ShootingPlan(
         U,
         X,
         T,
         params.integrator,
         simulated,
-        *simulate(params.task, nodes, U, K, T),
+        *simulate_plan(params.task, nodes, U, K, T),
         np.linalg.norm(by_control, axis=(1, 3)),
-        _condition(scale[:, None] * hessian * scale, end),
+        _condition_number(scale[:, None] * hessian * scale, end),
     )
 
 
-def held_where_diverged(X: np.ndarray) -> np.ndarray:
+def hold_after_divergence(X: np.ndarray) -> np.ndarray:
     """X (k + 1, nx), resting at its last state that has not diverged."""
     with np.errstate(invalid="ignore"):
         sound = np.abs(X).max(axis=1) <= LARGEST_STATE
@@ -96,7 +96,7 @@ def held_where_diverged(X: np.ndarray) -> np.ndarray:
     return np.asarray(X[np.minimum(np.arange(len(X)), last)])
 
 
-def _condition(H: np.ndarray, J: np.ndarray) -> float:
+def _condition_number(H: np.ndarray, J: np.ndarray) -> float:
     """The ratio of the largest and the least singular value."""
     m = len(J)
     values = np.abs(np.linalg.eigvalsh(np.block([[H, J.T], [J, np.zeros((m, m))]])))

@@ -5,20 +5,24 @@ from collections.abc import Mapping
 import numpy as np
 
 from labs.algorithms.shooting_steps import SHOOTING_METHODS
-from labs.optimal_control.single_shooting.changes import FAN, changed_ends, changed_motions
+from labs.optimal_control.single_shooting.control_changes import (
+    CHANGE_FRACTIONS,
+    changed_motions,
+    final_states,
+)
 from labs.optimal_control.single_shooting.history import ShootingHistory
 from labs.optimal_control.single_shooting.params import SingleShootingParams
 from labs.optimal_control.single_shooting.plan import ShootingPlan
 from labs.optimal_control.single_shooting.studies import (
-    DIFFERENCES,
+    DIFFERENCE_STEPS,
+    GRADIENT_METHODS,
     INTEGRATION_STEPS,
-    SIZES,
-    WAYS,
+    TIMED_PIECES,
     AccuracyStudy,
 )
 from labs.plots import Curves, HeatMap, Line, Plot, Readout, TimeSeries, Trace
 
-GRADIENTS, INTEGRATION = {"study": ("gradients",)}, {"study": ("integration",)}
+WITH_GRADIENT_STUDY, WITH_INTEGRATION_STUDY = {"study": ("gradients",)}, {"study": ("integration",)}
 
 PLOTS: tuple[Plot, ...] = (
     HeatMap(
@@ -84,7 +88,7 @@ PLOTS: tuple[Plot, ...] = (
         Trace("eps_ends", "sensitivities_error", "sensitivities, from adjoint", "dash", 3),
         log_x=True,
         log_y=True,
-        when=GRADIENTS,
+        when=WITH_GRADIENT_STUDY,
     ),
     Curves(
         "Time of a gradient",
@@ -93,7 +97,7 @@ PLOTS: tuple[Plot, ...] = (
         Trace("sizes", "gradient_times", ("sensitivities", "adjoint", "differences"), "marked", 1),
         log_x=True,
         log_y=True,
-        when=GRADIENTS,
+        when=WITH_GRADIENT_STUDY,
     ),
     Curves(
         "Error of the state",
@@ -104,7 +108,7 @@ PLOTS: tuple[Plot, ...] = (
         ),
         log_x=True,
         log_y=True,
-        when=INTEGRATION,
+        when=WITH_INTEGRATION_STUDY,
     ),
     Curves(
         "Error of the cost",
@@ -113,7 +117,7 @@ PLOTS: tuple[Plot, ...] = (
         Trace("steps", "cost_errors", ("augmented state (x, c)", "the notes' sum"), "marked", 1),
         log_x=True,
         log_y=True,
-        when=INTEGRATION,
+        when=WITH_INTEGRATION_STUDY,
     ),
     TimeSeries(
         "Position",
@@ -164,9 +168,9 @@ def sensitivity_fields(plan: ShootingPlan, chosen: int, grown: float) -> dict[st
 
 def change_fields(params: SingleShootingParams, plan: ShootingPlan) -> dict[str, np.ndarray]:
     """The joint that tells most, and where it ends, as the chosen control changes."""
-    k, j = min(params.chosen, plan.N - 1), params.task.shown
+    k, j = min(params.chosen_piece, plan.N - 1), params.task.shown
     changed = changed_motions(params.system, plan, k, params.delta)
-    ends = changed_ends(params.system, plan, k)
+    ends = final_states(params.system, plan, k)
     stairs = np.repeat(plan.U / params.task.u_0, 2, axis=0)
     after = stairs[:, params.task.motor].copy()
     after[2 * k : 2 * k + 2] += params.delta
@@ -174,14 +178,14 @@ def change_fields(params: SingleShootingParams, plan: ShootingPlan) -> dict[str,
     return {
         "t": np.linspace(0.0, plan.T, len(plan.X)),
         "planned": plan.X[:, j],
-        "changed": changed.fan[-1, :, j],
-        "opposite": changed.fan[FAN.index(-1.0), :, j],
-        "forecast": changed.forecast[:, j],
+        "changed": changed.states[-1, :, j],
+        "opposite": changed.states[CHANGE_FRACTIONS.index(-1.0), :, j],
+        "forecast": changed.linear_prediction[:, j],
         "change": ends.changes,
-        "end": ends.truth[:, j],
-        "end_forecast": ends.forecast[:, j],
+        "end": ends.states[:, j],
+        "end_forecast": ends.linear_prediction[:, j],
         "chosen_change": np.array([params.delta]),
-        "chosen_end": changed.fan[-1, -1:, j],
+        "chosen_end": changed.states[-1, -1:, j],
         "stair_t": np.repeat(edges, 2)[1:-1],
         "stairs": stairs,
         "changed_stairs": after,
@@ -193,14 +197,14 @@ def study_fields(
 ) -> dict[str, np.ndarray]:
     """Curves of what was measured besides; empty where it was not."""
     measured = len(study.gradient_errors) > 0
-    times = [np.atleast_1d(seconds.get(way, np.zeros(0))) for way in WAYS]
+    times = [np.atleast_1d(seconds.get(way, np.zeros(0))) for way in GRADIENT_METHODS]
     same = study.sensitivities_error
     return {
-        "eps": DIFFERENCES[: len(study.gradient_errors)],
+        "eps": DIFFERENCE_STEPS[: len(study.gradient_errors)],
         "gradient_errors": study.gradient_errors,
-        "eps_ends": DIFFERENCES[[0, -1]] if measured else np.zeros(0),
+        "eps_ends": DIFFERENCE_STEPS[[0, -1]] if measured else np.zeros(0),
         "sensitivities_error": np.full(2, same) if measured else np.zeros(0),
-        "sizes": np.array(SIZES[: len(times[0])], dtype=float),
+        "sizes": np.array(TIMED_PIECES[: len(times[0])], dtype=float),
         "gradient_times": 1e3 * np.stack(times, axis=1),
         "steps": np.array(INTEGRATION_STEPS[: len(study.state_errors)], dtype=float),
         "state_errors": study.state_errors,

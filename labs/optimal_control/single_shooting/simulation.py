@@ -17,7 +17,7 @@ from labs.problems.linear_quadratic import LqrProblem
 from labs.problems.optimal_control import LARGEST_STATE
 from labs.tasks.direct.systems import RestToRestTask
 
-STEP = 0.01
+MAX_STEP = 0.01
 """[s] The most a step of the simulation takes; it goes by RK4."""
 
 
@@ -36,13 +36,13 @@ def tracking_gains(linearization: StepDerivatives, N: int, u_0: np.ndarray) -> n
         return np.zeros((N, nu, nx))
 
 
-def simulate(
+def simulate_plan(
     at: RestToRestTask, X: np.ndarray, U: np.ndarray, K: np.ndarray, T: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """States (k N + 1, nx) on an even grid over T [s], and the controls (N, nu) that were given.
     X (N + 1, nx) and U (N, nu) are the plan's. It rests where it diverges."""
     N, n = len(U), at.mechanism.nq
-    M = int(np.ceil(T / N / STEP - 1e-9))
+    M = int(np.ceil(T / N / MAX_STEP - 1e-9))
     h = np.full(n, T / N / M)
     held = np.zeros(at.mechanism.nu)
     acceleration = at.mechanism.acceleration(held)

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from labs.algorithms.inverse_kinematics import REACHED, joint_rates, scale_to_speed_limit
+from labs.algorithms.inverse_kinematics import REACH_TOLERANCE, joint_rates, scale_to_speed_limit
 from labs.algorithms.jacobian import (
     analytical_jacobian,
     geometric_jacobian,
@@ -31,7 +31,7 @@ from labs.reactive_control.differential_kinematics.plots import (
     singular_values,
 )
 from labs.reactive_control.differential_kinematics.target import (
-    LAP,
+    TARGET_PERIOD,
     nearest_reachable,
     target_motion,
     task_velocity,
@@ -40,7 +40,7 @@ from labs.scene import Scene
 
 SINGULARITY_WARNING = 0.05
 """A smallest singular value below this is called near a singularity."""
-SETTLED = 10
+REACH_CHECK_DELAY = 10
 """World steps a target's way stays as it is before it is asked whether it is within reach."""
 MAX_CONDITION = 1e6
 """Shown for any condition number beyond it."""
@@ -138,10 +138,10 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         model = params.arm.model
         moved = q + self.period * applied
         speed = float(np.linalg.norm(commanded))
-        farthest, _ = target_motion(params, anchor, LAP / 2)
+        farthest, _ = target_motion(params, anchor, TARGET_PERIOD / 2)
         settled = state.settled + 1 if np.array_equal(farthest, state.farthest) else 0
         nearest = state.nearest if settled else 0.0
-        if settled == SETTLED and params.mode == "follow":
+        if settled == REACH_CHECK_DELAY and params.mode == "follow":
             nearest = nearest_reachable(params, farthest, q)
         return DifferentialState(
             t=state.t + self.period,
@@ -165,12 +165,12 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         chain = params.kinematics.at(_posture(params, state))
         jacobian = geometric_jacobian(chain)
         sigma, product = singular_values(params, chain, jacobian)
-        rates = _rates(params, state)
+        rates = _joint_velocities(params, state)
         follows = params.mode == "follow"
         commanded = state.commanded if follows else rates
         target, _ = target_motion(params, state.anchor, state.clock)
         bias = geometric_jacobian_rate(chain, rates)[:3] @ rates
-        short = {"short": state.nearest} if follows and state.nearest > REACHED else {}
+        short = {"short": state.nearest} if follows and state.nearest > REACH_TOLERANCE else {}
         return short | {
             "q": _posture(params, state),
             "rates": commanded,
@@ -196,7 +196,7 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
     ) -> Mapping[str, np.ndarray]:
         """The Jacobians, (6, n); the twist and the rate of the pose, (6, 2)."""
         chain = params.kinematics.at(_posture(params, state))
-        return jacobian_fields(params, chain, _rates(params, state))
+        return jacobian_fields(params, chain, _joint_velocities(params, state))
 
     def notes(self, params: DifferentialParams, state: DifferentialState) -> Mapping[str, str]:
         """Whether the target can be reached."""
@@ -212,15 +212,15 @@ class DifferentialKinematics(Lab[DifferentialParams, DifferentialState]):
         scene.arm("robot", params.arm, q)
         scene.frame("frame", chain.placement, 0.12)
         draw_columns(scene, params.columns, chain, jacobian)
-        draw_twist(scene, tip, jacobian @ _rates(params, state))
+        draw_twist(scene, tip, jacobian @ _joint_velocities(params, state))
         draw_ellipsoids(scene, params.ellipsoid, tip, jacobian[:3])
         if params.mode == "follow":
             target, _ = target_motion(params, state.anchor, state.clock)
             scene.handle("target", target)
-            if state.nearest > REACHED:
+            if state.nearest > REACH_TOLERANCE:
                 draw_out_of_reach(scene, state.farthest, state.nearest)
             if params.reach > 0.0:
-                end, _ = target_motion(params, state.anchor, LAP / 2)
+                end, _ = target_motion(params, state.anchor, TARGET_PERIOD / 2)
                 scene.trail("path", np.array([state.anchor, end]), "reference")
         sigma, _ = singular_values(params, chain, jacobian)
         if sigma[-1] < SINGULARITY_WARNING:
@@ -233,7 +233,7 @@ def _posture(params: DifferentialParams, state: DifferentialState) -> np.ndarray
     return state.q if np.array_equal(posture, state.posture) else posture
 
 
-def _rates(params: DifferentialParams, state: DifferentialState) -> np.ndarray:
+def _joint_velocities(params: DifferentialParams, state: DifferentialState) -> np.ndarray:
     """(n,) [rad/s; m/s] the joint velocities the twist belongs to."""
     match params.mode:
         case "follow":

@@ -7,9 +7,9 @@ import numpy as np
 
 from labs.algorithms.inverse_kinematics import INVERSE_KINEMATICS_METHODS
 from labs.algorithms.jacobian import ForwardKinematics
-from labs.models.arms import JOINTS, Arm, load
+from labs.models.arms import JOINT_COUNTS, Arm, load_arm
 from labs.params import Group, Params
-from labs.tasks.arm.params import having_joint, joint_values, robot_choice
+from labs.tasks.arm.params import joint_values, robot_choice, where_joint_exists
 
 ROBOTS = ("ur5", "panda", "scara")
 FRAMES = {
@@ -35,7 +35,7 @@ INVERSE_KINEMATICS = Group("Inverse kinematics")
 
 def _angle(i: int) -> Any:
     slides = ["scara"] if i == 3 else []
-    turns = [name for name in ROBOTS if JOINTS[name] >= i and name not in slides]
+    turns = [name for name in ROBOTS if JOINT_COUNTS[name] >= i and name not in slides]
     return POSTURE.knob(
         0.0,
         -3.14,
@@ -59,7 +59,7 @@ def _rate(i: int, value: float = 0.0) -> Any:
         "rad/s",
         f"Speed {i}",
         step=0.01,
-        when={**having_joint(i, ROBOTS), "mode": ["posture", "velocity"]},
+        when={**where_joint_exists(i, ROBOTS), "mode": ["posture", "velocity"]},
         units={"robot": {"scara": "m/s"}} if i == 3 else {},
         help="Velocity of the joint, turning or sliding.",
     )
@@ -123,7 +123,7 @@ class DifferentialParams(Params):
 
     @property
     def arm(self) -> Arm:
-        return load(self.robot)
+        return load_arm(self.robot)
 
     @property
     def kinematics(self) -> ForwardKinematics:
@@ -156,7 +156,7 @@ class DifferentialParams(Params):
 
 @lru_cache(maxsize=32)
 def _forward_kinematics(robot: str, frame: str) -> ForwardKinematics:
-    arm = load(robot)
+    arm = load_arm(robot)
     if frame == "end-effector":
         return ForwardKinematics(arm.model, arm.tip)
     joint = min(int(frame.removeprefix("joint-")), arm.model.njoints - 1)

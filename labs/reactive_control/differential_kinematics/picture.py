@@ -10,7 +10,7 @@ CAMERA = ((0.92, 1.0, 0.87), (0.36, 0.08, 0.4))
 """Where a viewer stands and what it looks at [m]: reaching arms stay in view."""
 AXIS, COLUMN, TWIST = 0.3, 0.4, 0.8
 """[m] length of an axis; of a column of J_p per m/rad; of the velocity per m/s."""
-VELOCITY_BALL, FORCE_BALL, LONGEST = 0.25, 0.06, 0.4
+VELOCITY_ELLIPSOID_SCALE, FORCE_ELLIPSOID_SCALE, MAX_HALF_AXIS = 0.25, 0.06, 0.4
 """[m] per unit singular value of J_p, and of its inverse; longest half-axis drawn."""
 
 
@@ -31,7 +31,7 @@ def draw_columns(scene: Scene, columns: str, chain: PosedChain, jacobian: np.nda
 
 def draw_twist(scene: Scene, tip: np.ndarray, twist: np.ndarray) -> None:
     """The velocity of the frame as an arrow, its angular velocity as an arc around it."""
-    linear, angular = clip_norm(TWIST * twist[:3], LONGEST), twist[3:]
+    linear, angular = clip_norm(TWIST * twist[:3], MAX_HALF_AXIS), twist[3:]
     if np.linalg.norm(linear) > 0.01:
         scene.arrow("velocity", tip, tip + linear, "reference")
     omega = float(np.linalg.norm(angular))
@@ -44,9 +44,9 @@ def draw_ellipsoids(scene: Scene, which: str, tip: np.ndarray, linear: np.ndarra
     takes forces on half-axes u_k / sigma_k."""
     u, sigma, _ = np.linalg.svd(linear, full_matrices=False)
     if which in ("velocity", "both"):
-        scene.ellipsoid("velocities", tip, u * (VELOCITY_BALL * sigma), "actual")
+        scene.ellipsoid("velocities", tip, u * (VELOCITY_ELLIPSOID_SCALE * sigma), "actual")
     if which in ("force", "both"):
-        lengths = np.minimum(FORCE_BALL / np.maximum(sigma, 1e-9), LONGEST)
+        lengths = np.minimum(FORCE_ELLIPSOID_SCALE / np.maximum(sigma, 1e-9), MAX_HALF_AXIS)
         scene.ellipsoid("forces", tip, u * lengths, "force")
 
 

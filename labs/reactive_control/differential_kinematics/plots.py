@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labs.algorithms.inverse_kinematics import REACHED, manipulability
+from labs.algorithms.inverse_kinematics import REACH_TOLERANCE, manipulability
 from labs.algorithms.jacobian import PosedChain, analytical_jacobian, geometric_jacobian
 from labs.plots import Bars, Line, Matrix, Note, Readout, TimeSeries
 from labs.reactive_control.differential_kinematics.params import DifferentialParams
@@ -73,7 +73,7 @@ def reach_note(params: DifferentialParams, nearest: float) -> str:
     """Whether the target can be reached, the frame coming as near as `nearest` [m]."""
     if params.mode != "follow":
         return "No target is followed."
-    if nearest <= REACHED:
+    if nearest <= REACH_TOLERANCE:
         return "Nothing keeps the frame from where the target is."
     where = "At the far end of its way the" if params.reach > 0.0 else "The"
     return (

@@ -9,9 +9,9 @@ from labs.reactive_control.differential_kinematics.params import DifferentialPar
 
 MAX_CORRECTION, MAX_CORRECTION_TURN = 0.5, 1.0
 """[m/s], [rad/s] what the feedback of the error may ask of the end-effector."""
-LAP = 8.0
+TARGET_PERIOD = 8.0
 """[s] the target's way out and back."""
-STARTS = 5
+SEARCH_STARTS = 5
 """Postures the search for the nearest one begins at, besides the present one."""
 
 
@@ -19,13 +19,14 @@ def target_motion(
     params: DifferentialParams, anchor: np.ndarray, clock: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Position [m] and velocity [m/s] of the target, each (3,):
-    p* = anchor + A (1 - cos(2 pi t / LAP)) / 2 d, with d pointing away from the base axis."""
+    p* = anchor + A (1 - cos(2 pi t / TARGET_PERIOD)) / 2 d, with d pointing away from the base
+    axis."""
     outward = np.array([anchor[0], anchor[1], 0.0])
     length = float(np.linalg.norm(outward))
     direction = outward / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
-    phase = 2 * np.pi * clock / LAP
+    phase = 2 * np.pi * clock / TARGET_PERIOD
     distance = params.reach * (1.0 - np.cos(phase)) / 2.0
-    speed = params.reach * np.pi / LAP * np.sin(phase)
+    speed = params.reach * np.pi / TARGET_PERIOD * np.sin(phase)
     return anchor + distance * direction, speed * direction
 
 
@@ -45,10 +46,10 @@ def task_velocity(
 
 
 def nearest_reachable(params: DifferentialParams, target: np.ndarray, q: np.ndarray) -> float:
-    """[m] how near the frame can come to a place (3,), looked for from q (n,) and STARTS other
-    postures."""
+    """[m] how near the frame can come to a place (3,), looked for from q (n,) and SEARCH_STARTS
+    other postures."""
     model = params.arm.model
     lower, upper = model.lowerPositionLimit, model.upperPositionLimit
     bounds = np.maximum(lower, -np.pi), np.minimum(upper, np.pi)
-    others = np.random.default_rng(0).uniform(*bounds, (STARTS, len(q)))
+    others = np.random.default_rng(0).uniform(*bounds, (SEARCH_STARTS, len(q)))
     return nearest_distance(params.kinematics, target, [q, *others], lower, upper)

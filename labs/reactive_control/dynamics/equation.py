@@ -43,7 +43,7 @@ def drive_torque(
 
 
 @dataclass(frozen=True, eq=False)
-class Instant:
+class InstantaneousDynamics:
     """All of the equation at one instant."""
 
     terms: EquationTerms
@@ -57,7 +57,7 @@ class Instant:
     @classmethod
     def of(
         cls, params: DynamicsParams, world: Plant, q: np.ndarray, v: np.ndarray, t: float
-    ) -> "Instant":
+    ) -> "InstantaneousDynamics":
         """At q [rad], v [rad/s] and t [s]."""
         torque = drive_torque(params, world, q, v, t)
         external = world.tip_jacobian(q).T @ params.force

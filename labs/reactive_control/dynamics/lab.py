@@ -12,7 +12,11 @@ from labs.algorithms.integrators import INTEGRATORS
 from labs.lab import Inputs, Lab, Measurement, State
 from labs.models.plant import Plant, plant
 from labs.params import Value
-from labs.reactive_control.dynamics.equation import Instant, drive_torque, plant_under_gravity
+from labs.reactive_control.dynamics.equation import (
+    InstantaneousDynamics,
+    drive_torque,
+    plant_under_gravity,
+)
 from labs.reactive_control.dynamics.params import DynamicsParams
 from labs.reactive_control.dynamics.plots import PLOTS, plot_fields
 from labs.scene import Scene
@@ -93,7 +97,7 @@ class ArmDynamics(Lab[DynamicsParams, DynamicsState]):
             q, v = integrate(acceleration, q, v, h)
             work += float(held @ (q - start))
             if not float(v @ v) <= SPEED_LIMIT**2:
-                return _stopped(state)
+                return _stop_diverged(state)
         tip = world.tip(q)
         after = sum(world.energy(q, v)) - float(f @ tip)
         steps = state.steps + 1
@@ -111,14 +115,14 @@ class ArmDynamics(Lab[DynamicsParams, DynamicsState]):
         """The equation at this instant, and its two problems undone by one another."""
         world, q, v = _plant(params), state.q, state.v
         model, data = world.model, world.data
-        now = Instant.of(params, world, q, v, state.t)
+        now = InstantaneousDynamics.of(params, world, q, v, state.t)
         kinetic, potential = world.energy(q, v)
         applied = now.torque + now.external
         inertia, coriolis = now.terms.mass @ now.acceleration, now.terms.coriolis @ v
         asked = params.accelerations(model.nv, state.t)
         found = direct_dynamics(model, data, q, v, inverse_dynamics(model, data, q, v, asked))
         again = inverse_dynamics(model, data, q, v, now.acceleration)
-        return _apart(params.force, world.tip_jacobian(q) @ now.acceleration) | {
+        return _force_acceleration_angle(params.force, world.tip_jacobian(q) @ now.acceleration) | {
             "q": q,
             "v": v,
             "acceleration": now.acceleration,
@@ -164,7 +168,9 @@ def _plant(params: DynamicsParams) -> Plant:
     return plant_under_gravity(params.robot, params.payload, params.gravity)
 
 
-def _apart(force: np.ndarray, acceleration: np.ndarray) -> dict[str, float | np.ndarray]:
+def _force_acceleration_angle(
+    force: np.ndarray, acceleration: np.ndarray
+) -> dict[str, float | np.ndarray]:
     """The angle [degrees] between the force on the end-effector and its acceleration J q'', both
     (3,); none where there is no force or no acceleration."""
     sizes = float(np.linalg.norm(force) * np.linalg.norm(acceleration))
@@ -174,7 +180,7 @@ def _apart(force: np.ndarray, acceleration: np.ndarray) -> dict[str, float | np.
     return {"apart": float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))}
 
 
-def _stopped(state: DynamicsState) -> DynamicsState:
+def _stop_diverged(state: DynamicsState) -> DynamicsState:
     stopped = copy.deepcopy(state)
     stopped.trouble = (
         f"Stopped at t = {state.t:.2f} s: a joint passed {SPEED_LIMIT:g} rad/s. Nothing brakes "

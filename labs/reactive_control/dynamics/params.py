@@ -7,7 +7,7 @@ import numpy as np
 
 from labs.algorithms.integrators import INTEGRATORS
 from labs.params import Group, Params
-from labs.tasks.arm.params import having_joint, joint_values, offset_knob, robot_choice
+from labs.tasks.arm.params import joint_values, offset_knob, robot_choice, where_joint_exists
 from labs.tasks.arm.postures import POSED_ARMS, POSTURES, posture
 
 DRIVES = {
@@ -34,7 +34,7 @@ def _torque(joint: int) -> Any:
         "N·m",
         f"Joint {joint}",
         step=0.1,
-        when=having_joint(joint),
+        when=where_joint_exists(joint),
         help="Added to what drives the joints.",
     )
 
@@ -48,7 +48,7 @@ def _acceleration(joint: int, default: float = 0.0) -> Any:
         "rad/s²",
         f"Joint {joint}",
         step=0.1,
-        when=having_joint(joint),
+        when=where_joint_exists(joint),
         help="Inverse dynamics finds the torque for it.",
     )
 

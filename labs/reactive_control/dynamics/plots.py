@@ -7,7 +7,7 @@ import numpy as np
 from labs.algorithms.equation_of_motion import inverse_dynamics
 from labs.models.plant import Plant
 from labs.plots import Bars, Line, Matrix, Readout, TimeSeries
-from labs.reactive_control.dynamics.equation import Instant
+from labs.reactive_control.dynamics.equation import InstantaneousDynamics
 from labs.reactive_control.dynamics.params import DynamicsParams
 
 PLOTS = (
@@ -51,7 +51,7 @@ def plot_fields(
     params: DynamicsParams, world: Plant, q: np.ndarray, v: np.ndarray, t: float
 ) -> Mapping[str, np.ndarray]:
     """The terms as matrices, and the torque for the accelerations asked for."""
-    now = Instant.of(params, world, q, v, t)
+    now = InstantaneousDynamics.of(params, world, q, v, t)
     asked = params.accelerations(world.model.nv, t)
     needed = inverse_dynamics(world.model, world.data, q, v, asked) - now.external
     coriolis, gravity = now.terms.coriolis @ v, now.terms.gravity

@@ -4,7 +4,7 @@ import numpy as np
 
 from labs.models.plant import Force
 from labs.reactive_control.joint_control.params import JointParams
-from labs.reactive_control.joint_control.sampled_control import units
+from labs.reactive_control.joint_control.sampled_control import to_time_units
 
 PULL_STIFFNESS = 400.0
 """[N/m] between the end-effector and the handle that pulls it."""
@@ -48,8 +48,10 @@ def measurement_noise(
         return None
     counter = step << 64  # each step has 2^64 numbers of its own
     generator = np.random.Generator(np.random.Philox(key=key, counter=counter))
-    rows: np.ndarray = generator.standard_normal((units(period) // units(NOISE_STEP), 2, joints))
+    rows: np.ndarray = generator.standard_normal(
+        (to_time_units(period) // to_time_units(NOISE_STEP), 2, joints)
+    )
     rows *= np.array([[params.noise], [VELOCITY_NOISE * params.noise]])
-    h = units(params.step)
-    chosen: np.ndarray = rows[[k * h // units(NOISE_STEP) for k in due]]
+    h = to_time_units(params.step)
+    chosen: np.ndarray = rows[[k * h // to_time_units(NOISE_STEP) for k in due]]
     return chosen

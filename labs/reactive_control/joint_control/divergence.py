@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from labs.algorithms.integrators import INTEGRATORS
 from labs.reactive_control.joint_control.remedies import AvailableSettings, find_remedies
-from labs.reactive_control.joint_control.sampled_control import milliseconds
+from labs.reactive_control.joint_control.sampled_control import format_milliseconds
 from labs.reactive_control.joint_control.sampled_stability import (
     GROWTH_TOLERANCE,
     Diagnosis,
@@ -17,18 +17,20 @@ from labs.reactive_control.joint_control.sampled_stability import (
 )
 
 
-def explain(
+def divergence_message(
     loops: Sequence[LinearLoop], settings: LoopParameters, available: AvailableSettings
 ) -> str:
     """Why the loop diverged near its reference, and what to change, in some sentences. `loops`
     are at postures of the reference, the present one first."""
     diagnosis = loops[0].diagnose(settings)
     advice = " or ".join(remedy.text for remedy in find_remedies(loops, settings, available))
-    return " ".join(filter(None, (_why(settings, diagnosis), _sentence(advice, diagnosis))))
+    return " ".join(
+        filter(None, (_cause_message(settings, diagnosis), _advice_message(advice, diagnosis)))
+    )
 
 
-def _why(settings: LoopParameters, diagnosis: Diagnosis) -> str:
-    period, step = milliseconds(settings.period), milliseconds(settings.step)
+def _cause_message(settings: LoopParameters, diagnosis: Diagnosis) -> str:
+    period, step = format_milliseconds(settings.period), format_milliseconds(settings.step)
     method = INTEGRATORS[settings.integrator].title
     simulated = f"grows as exp({diagnosis.simulated:.3g} t)"
     match diagnosis.fault:
@@ -42,14 +44,14 @@ def _why(settings: LoopParameters, diagnosis: Diagnosis) -> str:
         case "period":
             return (
                 f"The control period is at fault: with continuous control the error would "
-                f"{_would_grow(diagnosis.continuous)}, but with the torque held for {period} it "
+                f"{_growth_phrase(diagnosis.continuous)}, but with the torque held for {period} it "
                 f"grows as exp({diagnosis.sampled:.3g} t)."
             )
         case "integrator":
             return (
                 f"The integrator and its step are at fault: {method} with {step} makes an error "
                 f"that {simulated}; integrated exactly it would "
-                f"{_would_grow(diagnosis.sampled)}."
+                f"{_growth_phrase(diagnosis.sampled)}."
             )
         case _:
             return (
@@ -58,11 +60,11 @@ def _why(settings: LoopParameters, diagnosis: Diagnosis) -> str:
             )
 
 
-def _would_grow(rate: float) -> str:
+def _growth_phrase(rate: float) -> str:
     return f"grow as exp({rate:.3g} t)" if rate > GROWTH_TOLERANCE else "not grow"
 
 
-def _sentence(advice: str, diagnosis: Diagnosis) -> str:
+def _advice_message(advice: str, diagnosis: Diagnosis) -> str:
     if advice:
         return f"Try {advice}."
     return "No stable setting was found near this one." if diagnosis.fault else ""

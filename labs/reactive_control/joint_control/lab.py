@@ -11,11 +11,11 @@ import numpy as np
 from labs.algorithms.integrators import INTEGRATORS
 from labs.algorithms.joint_control import CONTROL_LAWS, ControlLaw, Gains
 from labs.lab import Action, Handle, Inputs, Lab, Measurement, State
-from labs.models.arms import load
+from labs.models.arms import load_arm
 from labs.models.plant import Force, Plant, plant
 from labs.params import Value
 from labs.reactive_control.joint_control.disturbances import end_effector_force, measurement_noise
-from labs.reactive_control.joint_control.divergence import explain
+from labs.reactive_control.joint_control.divergence import divergence_message
 from labs.reactive_control.joint_control.linearisation import linear_loop, loops_along_reference
 from labs.reactive_control.joint_control.params import (
     AVAILABLE_SETTINGS,
@@ -25,11 +25,11 @@ from labs.reactive_control.joint_control.params import (
 from labs.reactive_control.joint_control.plots import PLOTS, eigenvalue_fields
 from labs.reactive_control.joint_control.references import reference_motion
 from labs.reactive_control.joint_control.sampled_control import (
-    UNIT,
+    TIME_UNIT,
     SampledLoop,
+    control_ticks,
     simulate_sampled,
-    ticks,
-    units,
+    to_time_units,
 )
 from labs.reactive_control.joint_control.step_response import StepResponse
 from labs.scene import Scene
@@ -125,7 +125,7 @@ class JointControl(Lab[JointParams, JointState]):
             integral=np.zeros_like(q),
             torque=np.zeros_like(q),
             force=np.zeros(3),
-            since_tick=units(max(CONTROL_PERIODS)),
+            since_tick=to_time_units(max(CONTROL_PERIODS)),
             noise_key=int(rng.integers(2**63)),
             sum_of_squares=float(error @ error) / len(error),
             errors=np.tile(error, (ERROR_WINDOW, 1)),
@@ -142,11 +142,11 @@ class JointControl(Lab[JointParams, JointState]):
         world = plant(params.robot, params.payload)
         push_left = PUSH_STEPS if "push" in inputs.actions else state.push_left
         force = end_effector_force(params, push_left > 0, inputs.handles.get("pull"))
-        h = units(params.step)
-        steps = units(self.period) // h
-        due, since = ticks(state.since_tick, units(params.control_period), h, steps)
+        h = to_time_units(params.step)
+        steps = to_time_units(self.period) // h
+        due, since = control_ticks(state.since_tick, to_time_units(params.control_period), h, steps)
 
-        phase = state.phase + params.rate * _offsets(due, steps, h)
+        phase = state.phase + params.rate * _tick_times(due, steps, h)
         q_ref, v_ref, a_ref = self._reference(params, phase)
         loop = self._loop(params, world, force, state.torque.copy())
         with np.errstate(all="ignore"):
@@ -164,11 +164,11 @@ class JointControl(Lab[JointParams, JointState]):
             )
             diverged = _has_diverged(v)
         if diverged:
-            return _stopped(params, state)
+            return _stop_diverged(params, state)
 
         count = state.steps + 1
         t = count * self.period
-        response = self._response(params, state, q_ref[0])
+        response = self._update_response(params, state, q_ref[0])
         error = q_ref[-1] - q
         tip = world.tip(q)
         trail, reference_trail = state.trail.copy(), state.reference_trail.copy()
@@ -235,7 +235,7 @@ class JointControl(Lab[JointParams, JointState]):
 
     def draw(self, scene: Scene, params: JointParams, state: JointState) -> None:
         """The arm, a ghost at the reference, where both end-effectors were, and the force."""
-        arm = load(params.robot)
+        arm = load_arm(params.robot)
         tip = (
             state.trail[-1] if state.steps % TRAIL_STRIDE == 0 else plant(params.robot).tip(state.q)
         )
@@ -251,7 +251,7 @@ class JointControl(Lab[JointParams, JointState]):
     def _reference(
         self, params: JointParams, phase: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        home = load(params.robot).home
+        home = load_arm(params.robot).home
         return reference_motion(params.reference, home, params.amplitude, params.rate, phase)
 
     def _loop(
@@ -259,7 +259,7 @@ class JointControl(Lab[JointParams, JointState]):
     ) -> SampledLoop:
         return SampledLoop(
             law=_law(params.controller, params.robot, params.gains),
-            limit=_limit(params.robot, params.torque_limits),
+            limit=_torque_limit(params.robot, params.torque_limits),
             acceleration=world.acceleration(held, params.friction, force),
             held=held,
             integrate=INTEGRATORS[params.integrator].step,
@@ -267,7 +267,7 @@ class JointControl(Lab[JointParams, JointState]):
             integral_gain=params.loop_settings.period if params.integrates else 0.0,
         )
 
-    def _response(
+    def _update_response(
         self, params: JointParams, state: JointState, q_ref: np.ndarray
     ) -> StepResponse | None:
         """The step response under way; a set point that has moved begins another."""
@@ -285,9 +285,9 @@ def _law(controller: str, robot: str, gains: Gains) -> ControlLaw:
 
 
 @lru_cache(maxsize=256)
-def _offsets(due: tuple[int, ...], steps: int, h: int) -> np.ndarray:
+def _tick_times(due: tuple[int, ...], steps: int, h: int) -> np.ndarray:
     """Times [s] after a world step's start: its start, its control ticks and its end."""
-    return np.array((0, *due, steps)) * (h * UNIT)
+    return np.array((0, *due, steps)) * (h * TIME_UNIT)
 
 
 def _has_diverged(v: np.ndarray) -> bool:
@@ -299,15 +299,15 @@ def _has_diverged(v: np.ndarray) -> bool:
 
 
 @cache
-def _limit(robot: str, limited: bool) -> np.ndarray:
+def _torque_limit(robot: str, limited: bool) -> np.ndarray:
     """(nv,) [N m], infinite when the motors are not limited."""
-    limit = load(robot).torque_limit
+    limit = load_arm(robot).torque_limit
     return limit if limited else np.full_like(limit, np.inf)
 
 
-def _stopped(params: JointParams, state: JointState) -> JointState:
+def _stop_diverged(params: JointParams, state: JointState) -> JointState:
     """The last sane state, and why it went no further."""
-    why = explain(
+    why = divergence_message(
         loops_along_reference(params, state.q_ref), params.loop_settings, AVAILABLE_SETTINGS
     )
     stopped = copy.deepcopy(state)

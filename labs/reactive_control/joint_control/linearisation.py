@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from labs.models.arms import load
+from labs.models.arms import load_arm
 from labs.models.plant import plant
 from labs.reactive_control.joint_control.params import JointParams
 from labs.reactive_control.joint_control.references import reference_motion
 from labs.reactive_control.joint_control.sampled_stability import LinearisedRobot, LinearLoop
 
-PHASES = np.array([0.0, 0.25, 0.45, 0.75])
+LINEARISATION_PHASES = np.array([0.0, 0.25, 0.45, 0.75])
 """Of the reference [cycles]: where it is linearised on its way."""
 
 
@@ -21,6 +21,8 @@ def linear_loop(params: JointParams, q: np.ndarray) -> LinearLoop:
 
 def loops_along_reference(params: JointParams, q_ref: np.ndarray) -> list[LinearLoop]:
     """The loop where the reference is, q_ref (nq,), and where it comes on its way."""
-    home = load(params.robot).home
-    postures, _, _ = reference_motion(params.reference, home, params.amplitude, params.rate, PHASES)
+    home = load_arm(params.robot).home
+    postures, _, _ = reference_motion(
+        params.reference, home, params.amplitude, params.rate, LINEARISATION_PHASES
+    )
     return [linear_loop(params, q) for q in (q_ref, *np.unique(postures, axis=0))]

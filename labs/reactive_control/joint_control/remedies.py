@@ -1,8 +1,8 @@
 """What makes a diverging sampled loop stable, searched for among what the user can set.
 
 A change is proposed only if the linearised, simulated loop is stable with it, and with a margin:
-also with k_p and k_i, or k_d, or all of them, MARGIN times larger and smaller, at every posture
-given. Where a gain may take any value of a range, both ends of the range are named.
+also with k_p and k_i, or k_d, or all of them, GAIN_MARGIN times larger and smaller, at every
+posture given. Where a gain may take any value of a range, both ends of the range are named.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,7 +13,7 @@ import numpy as np
 
 from labs.algorithms.integrators import INTEGRATORS
 from labs.algorithms.joint_control import Gains
-from labs.reactive_control.joint_control.sampled_control import milliseconds
+from labs.reactive_control.joint_control.sampled_control import format_milliseconds
 from labs.reactive_control.joint_control.sampled_stability import (
     GROWTH_TOLERANCE,
     LinearLoop,
@@ -21,12 +21,12 @@ from labs.reactive_control.joint_control.sampled_stability import (
 )
 
 BISECTIONS = 6
-MOST_REMEDIES = 2
-MARGIN = 1.25
+MAX_REMEDIES = 2
+GAIN_MARGIN = 1.25
 """Factor by which the gains may be off, and what is proposed still be stable."""
-FASTER_ALONE = 1.0
+OPEN_LOOP_GROWTH_MARGIN = 1.0
 """[1/s] by which the robot without control may grow faster than it would, integrated exactly."""
-LARGEST_SAG = 0.3
+MAX_STATIC_DEVIATION = 0.3
 """[rad] The linearised loop tells about the robot only where it comes to rest nearby."""
 SMALLEST_GAIN = 0.01
 """The least k_p or k_d that is tried besides 0, and the least share of k_i."""
@@ -61,7 +61,7 @@ def find_remedies(
     """What helps: stable near the reference with a margin, the one that goes to the
     root first."""
     searches = {
-        "gains": (_less_integral, _other_damping, _other_stiffness, _feedback),
+        "gains": (_smaller_integral_gain, _other_damping, _other_stiffness, _add_feedback),
         "period": (_shorter_period, _other_damping, _other_stiffness),
         "integrator": (_other_integrator, _shorter_step, _other_damping, _other_stiffness),
     }.get(loops[0].diagnose(settings).fault, ())
@@ -70,20 +70,23 @@ def find_remedies(
         found += search(loops, settings, available)
     if searches and not found:
         found += _other_gains(loops, settings, available)
-    return found[:MOST_REMEDIES]
+    return found[:MAX_REMEDIES]
 
 
 def robustly_stable(loops: Sequence[LinearLoop], settings: LoopParameters) -> bool:
     """Whether the simulated loop rests near all postures and is stable there with all gains
-    MARGIN off, and the integrator does not blow up the robot alone, which is what is left of the
-    loop while a motor gives all it can."""
+    GAIN_MARGIN off, and the integrator does not blow up the robot alone, which is what is left of
+    the loop while a motor gives all it can."""
     alone = replace(settings, controller="open-loop")
-    factors = [(1.0, 1.0), *product((MARGIN, 1.0 / MARGIN), repeat=2)]
-    nearby = [replace(settings, gains=_scaled(settings.gains, *each)) for each in factors]
+    factors = [(1.0, 1.0), *product((GAIN_MARGIN, 1.0 / GAIN_MARGIN), repeat=2)]
+    nearby = [replace(settings, gains=_scale_gains(settings.gains, *each)) for each in factors]
     return (
-        all(loop.growth(near) <= GROWTH_TOLERANCE for near in nearby for loop in loops)
-        and all(loop.sag(settings) <= LARGEST_SAG for loop in loops)
-        and all(loop.growth(alone) <= loop.poles(alone).real.max() + FASTER_ALONE for loop in loops)
+        all(loop.growth_rate(near) <= GROWTH_TOLERANCE for near in nearby for loop in loops)
+        and all(loop.static_deviation(settings) <= MAX_STATIC_DEVIATION for loop in loops)
+        and all(
+            loop.growth_rate(alone) <= loop.poles(alone).real.max() + OPEN_LOOP_GROWTH_MARGIN
+            for loop in loops
+        )
     )
 
 
@@ -96,7 +99,7 @@ def _shorter_period(
     ):
         change = replace(settings, control_period=period)
         if change.period < settings.period and robustly_stable(loops, change):
-            yield Remedy(f"a control period of {milliseconds(period)}", (change,))
+            yield Remedy(f"a control period of {format_milliseconds(period)}", (change,))
             return
 
 
@@ -107,7 +110,7 @@ def _shorter_step(
     for step in sorted((h for h in available.steps if h < settings.step), reverse=True):
         change = replace(settings, step=step)
         if robustly_stable(loops, change):
-            yield Remedy(f"a step of {milliseconds(step)}", (change,))
+            yield Remedy(f"a step of {format_milliseconds(step)}", (change,))
             return
 
 
@@ -126,27 +129,27 @@ def _other_damping(
     loops: Sequence[LinearLoop], settings: LoopParameters, available: AvailableSettings
 ) -> Iterator[Remedy]:
     """The stable range of k_d nearest to the present one."""
-    return _nearest_range(loops, settings, "kd", available.highest_kd)
+    return _nearest_stable_range(loops, settings, "kd", available.highest_kd)
 
 
 def _other_stiffness(
     loops: Sequence[LinearLoop], settings: LoopParameters, available: AvailableSettings
 ) -> Iterator[Remedy]:
     """The stable range of k_p nearest to the present one."""
-    return _nearest_range(loops, settings, "kp", available.highest_kp)
+    return _nearest_stable_range(loops, settings, "kp", available.highest_kp)
 
 
-def _less_integral(
+def _smaller_integral_gain(
     loops: Sequence[LinearLoop], settings: LoopParameters, available: AvailableSettings
 ) -> Iterator[Remedy]:
     """The smallest stable k_i, and all up to the first that is not."""
     ki = settings.gains.ki
     if settings.controller == "pid" and ki > 0.0:
-        tried = np.concatenate([[0.0], _between(SMALLEST_GAIN * ki, ki)])
-        yield from _first_range(loops, settings, "ki", tried, range(len(tried)))
+        tried = np.concatenate([[0.0], _gain_grid(SMALLEST_GAIN * ki, ki)])
+        yield from _stable_range(loops, settings, "ki", tried, range(len(tried)))
 
 
-def _feedback(
+def _add_feedback(
     loops: Sequence[LinearLoop], settings: LoopParameters, available: AvailableSettings
 ) -> Iterator[Remedy]:
     """PD with gravity compensation instead of no feedback at all."""
@@ -178,18 +181,18 @@ def _other_gains(
                 return
 
 
-def _nearest_range(
+def _nearest_stable_range(
     loops: Sequence[LinearLoop], settings: LoopParameters, gain: str, highest: float
 ) -> Iterator[Remedy]:
     """Of a gain from 0 to `highest`: the stable range nearest to the present value."""
     if settings.controller != "open-loop":
-        tried = np.concatenate([[0.0], _between(SMALLEST_GAIN, highest)])
+        tried = np.concatenate([[0.0], _gain_grid(SMALLEST_GAIN, highest)])
         here = max(getattr(settings.gains, gain), SMALLEST_GAIN)
         distances = np.abs(np.log(np.maximum(tried, SMALLEST_GAIN) / here))
-        yield from _first_range(loops, settings, gain, tried, np.argsort(distances, kind="stable"))
+        yield from _stable_range(loops, settings, gain, tried, np.argsort(distances, kind="stable"))
 
 
-def _first_range(
+def _stable_range(
     loops: Sequence[LinearLoop],
     settings: LoopParameters,
     gain: str,
@@ -215,9 +218,9 @@ def _first_range(
         last += 1
     low, high = float(tried[first]), float(tried[last])
     if first > 0:
-        low = _rounded(_edge(accepted, low, tried[first - 1]), up=True)
+        low = _round_to_two_digits(_bisect_limit(accepted, low, tried[first - 1]), up=True)
     if last < len(tried) - 1:
-        high = _rounded(_edge(accepted, high, tried[last + 1]), up=False)
+        high = _round_to_two_digits(_bisect_limit(accepted, high, tried[last + 1]), up=False)
     if low <= high and accepted(low) and accepted(high):
         words = f"from {low:g} to {high:g}"
         if low == high:
@@ -229,7 +232,7 @@ def _first_range(
         yield Remedy(f"k_{gain[1]} {words}", (changed(low), changed(high)))
 
 
-def _edge(accepted: Callable[[float], bool], inside: float, outside: float) -> float:
+def _bisect_limit(accepted: Callable[[float], bool], inside: float, outside: float) -> float:
     """The last accepted value on the way from one that is to one that is not."""
     for _ in range(BISECTIONS):
         middle = 0.5 * (inside + outside)
@@ -237,23 +240,23 @@ def _edge(accepted: Callable[[float], bool], inside: float, outside: float) -> f
     return inside
 
 
-def _between(low: float, high: float) -> np.ndarray:
+def _gain_grid(low: float, high: float) -> np.ndarray:
     """(k,) from low to high, each at most GAIN_RATIO times the one before."""
     return np.geomspace(low, high, int(np.ceil(np.log(high / low) / np.log(GAIN_RATIO))) + 1)
 
 
 def _round_numbers(highest: float) -> list[float]:
-    """1, 2 and 5 times powers of ten, from SMALLEST to `highest`."""
+    """1, 2 and 5 times powers of ten, from SMALLEST_GAIN to `highest`."""
     decades = range(int(np.floor(np.log10(SMALLEST_GAIN))), int(np.log10(highest)) + 1)
     numbers = [float(f"{digit}e{decade}") for decade in decades for digit in (1, 2, 5)]
     return [number for number in numbers if SMALLEST_GAIN <= number <= highest]
 
 
-def _scaled(gains: Gains, stiffness: float, damping: float) -> Gains:
+def _scale_gains(gains: Gains, stiffness: float, damping: float) -> Gains:
     return Gains(stiffness * gains.kp, stiffness * gains.ki, damping * gains.kd)
 
 
-def _rounded(value: float, *, up: bool) -> float:
+def _round_to_two_digits(value: float, *, up: bool) -> float:
     """To two significant digits, upward or downward."""
     if value <= 0.0:
         return 0.0

@@ -20,16 +20,16 @@ import numpy as np
 from labs.algorithms.integrators import Acceleration, IntegratorStep
 from labs.algorithms.joint_control import ControlLaw
 
-UNIT = 1e-4
+TIME_UNIT = 1e-4
 """[s] the unit of time counted here."""
 
 
-def units(seconds: float) -> int:
+def to_time_units(seconds: float) -> int:
     """This many seconds as a whole number of units."""
-    return round(seconds / UNIT)
+    return round(seconds / TIME_UNIT)
 
 
-def milliseconds(seconds: float) -> str:
+def format_milliseconds(seconds: float) -> str:
     """A time [s] in words: "2 ms"."""
     return f"{1000 * seconds:g} ms"
 
@@ -41,7 +41,7 @@ def time_between_ticks(period: int, step: int) -> int:
 
 
 @lru_cache(maxsize=256)
-def ticks(since: int, period: int, step: int, steps: int) -> tuple[tuple[int, ...], int]:
+def control_ticks(since: int, period: int, step: int, steps: int) -> tuple[tuple[int, ...], int]:
     """Which of the next `steps` integration steps begin with a control tick, when the last tick
     was `since` units ago; and how long ago the last one is at the end."""
     due = []

@@ -23,13 +23,17 @@ import pinocchio as pin
 from labs.algorithms.discretisation import zero_order_hold, zero_order_hold_integrated
 from labs.algorithms.equation_of_motion import mass_matrix
 from labs.algorithms.joint_control import CONTROL_LAWS, Gains, linearise_law
-from labs.reactive_control.joint_control.sampled_control import UNIT, time_between_ticks, units
+from labs.reactive_control.joint_control.sampled_control import (
+    TIME_UNIT,
+    time_between_ticks,
+    to_time_units,
+)
 
 GROWTH_TOLERANCE = 1e-3
 """[1/s] growth below this is not told from none: at a pole on the stability boundary, rounding
 alone is worth that much."""
 
-EXPLAINING_SHARE = 0.6
+FAULT_SHARE = 0.6
 """A loop that grows at least this fast, as a share of the simulated one, explains it. With
 k_d = 0 and T = h explicit Euler grows twice as fast as holding the torque alone would."""
 
@@ -80,7 +84,10 @@ class LoopParameters:
     @property
     def period(self) -> float:
         """Between two ticks: the control period rounded up to whole integration steps."""
-        return time_between_ticks(units(self.control_period), units(self.step)) * UNIT
+        return (
+            time_between_ticks(to_time_units(self.control_period), to_time_units(self.step))
+            * TIME_UNIT
+        )
 
 
 @dataclass(frozen=True)
@@ -106,7 +113,7 @@ class LinearLoop:
     def poles(self, settings: LoopParameters) -> np.ndarray:
         """Eigenvalues [1/s] of the loop under continuous control."""
         a, b = self.robot.dynamics()
-        return np.linalg.eigvals(self._closed(settings, a, b, 1.0, sampled=False))
+        return np.linalg.eigvals(self._closed_loop_matrix(settings, a, b, 1.0, sampled=False))
 
     def multipliers(self, settings: LoopParameters, *, exact: bool = False) -> np.ndarray:
         """Eigenvalues of the map over one control period, the robot's motion between ticks
@@ -119,14 +126,16 @@ class LinearLoop:
                 settings.integrator, settings.step, a, b, settings.period
             )
         )
-        return np.linalg.eigvals(self._closed(settings, phi, gamma, settings.period, sampled=True))
+        return np.linalg.eigvals(
+            self._closed_loop_matrix(settings, phi, gamma, settings.period, sampled=True)
+        )
 
-    def growth(self, settings: LoopParameters, *, exact: bool = False) -> float:
+    def growth_rate(self, settings: LoopParameters, *, exact: bool = False) -> float:
         """sigma [1/s] of the sampled loop."""
         radius = float(np.abs(self.multipliers(settings, exact=exact)).max())
         return float(np.log(max(radius, 1e-300))) / settings.period
 
-    def sag(self, settings: LoopParameters) -> float:
+    def static_deviation(self, settings: LoopParameters) -> float:
         """[rad] how far from q a joint comes to rest: what the law's torque at q lacks of the
         load, over the stiffness, (K_q + G) dq = tau - g. None with an integral; infinite without
         any stiffness."""
@@ -144,16 +153,14 @@ class LinearLoop:
     def diagnose(self, settings: LoopParameters) -> Diagnosis:
         """Which of the three loops is the first to be at fault."""
         continuous = float(self.poles(settings).real.max())
-        sampled, simulated = self.growth(settings, exact=True), self.growth(settings)
+        sampled, simulated = self.growth_rate(settings, exact=True), self.growth_rate(settings)
         rates = {"gains": continuous, "period": sampled, "integrator": simulated}
         fault = ""
         if simulated > GROWTH_TOLERANCE:
-            fault = next(
-                name for name, rate in rates.items() if rate >= EXPLAINING_SHARE * simulated
-            )
+            fault = next(name for name, rate in rates.items() if rate >= FAULT_SHARE * simulated)
         return Diagnosis(continuous, sampled, simulated, fault)
 
-    def _closed(
+    def _closed_loop_matrix(
         self,
         settings: LoopParameters,
         phi: np.ndarray,

@@ -3,7 +3,7 @@
 A step of the reference leaves the error e0 = q_ref - q (nv,) [rad]; its size is max |e0_i|.
 
     overshoot       the farthest any joint goes beyond its reference, as a share of the size
-    settling time   when the largest error last came within BAND of the size
+    settling time   when the largest error last came within SETTLING_BAND of the size
 
 Both are what samples at the times of `update` show.
 """
@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-BAND = 0.02
+SETTLING_BAND = 0.02
 """Share of the step's size within which the response counts as settled."""
 
-SMALLEST = 1e-6
+SMALLEST_STEP = 1e-6
 """[rad] a smaller error is no step."""
 
 
@@ -39,12 +39,12 @@ class StepResponse:
         size = float(np.abs(error).max())
         error = error.copy()
         error.flags.writeable = False
-        return cls(time, error, size) if size > SMALLEST else None
+        return cls(time, error, size) if size > SMALLEST_STEP else None
 
     def update(self, time: float, error: np.ndarray) -> "StepResponse":
         """With the error e (nv,) [rad] at this time [s] taken into account."""
         beyond = float((-np.sign(self.error) * error).max()) / self.size
-        inside = float(np.abs(error).max()) <= BAND * self.size
+        inside = float(np.abs(error).max()) <= SETTLING_BAND * self.size
         settled = self.settled if self.settled >= 0.0 else time - self.time
         return StepResponse(
             self.time,

@@ -8,7 +8,7 @@ from labs.algorithms.orientation import (
     angle_axis_to_matrix,
     euler_axes,
     euler_to_matrix,
-    lost_direction,
+    gimbal_lock_direction,
     matrix_to_euler,
 )
 
@@ -37,7 +37,7 @@ class Gimbal:
     def axis(self) -> np.ndarray:
         """u (3,)."""
         if self.direction == "lost":
-            return lost_direction(self.sequence, 0.0)
+            return gimbal_lock_direction(self.sequence, 0.0)
         letter = self.sequence[0 if self.direction == "first" else 1]
         axis: np.ndarray = np.eye(3)["xyz".index(letter)]
         return axis

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from labs.algorithms.frame_chain import multiply_poses
-from labs.algorithms.orientation import lock_sine, matrix_to_angle_axis, matrix_to_quaternion
+from labs.algorithms.orientation import gimbal_lock_sine, matrix_to_angle_axis, matrix_to_quaternion
 from labs.lab import Inputs, Lab, Measurement, State
 from labs.params import Value
 from labs.reactive_control.kinematics.gimbal import Gimbal
@@ -116,7 +116,7 @@ class Kinematics(Lab[KinematicsParams, KinematicsState]):
         end-effector: how far its R is from orthonormal, and the same law."""
         gimbal = params.gimbal
         rotation = multiply_poses(params.chain.factors(params.q))[:3, :3]
-        tool = lock_sine(params.sequence, gimbal.angles(rotation)[1])
+        tool = gimbal_lock_sine(params.sequence, gimbal.angles(rotation)[1])
         phi, theta, psi = gimbal.angles(state.rotation)
         perturbed = gimbal.angles(gimbal.turn(PERTURBATION) @ state.rotation)
         change = float(np.abs(_wrap(perturbed - (phi, theta, psi))).max())
@@ -134,7 +134,7 @@ class Kinematics(Lab[KinematicsParams, KinematicsState]):
             "qy": y,
             "qz": z,
             "amplification": min(change / PERTURBATION, MAX_AMPLIFICATION),
-            "law": _amplification(lock_sine(params.sequence, theta)),
+            "law": _amplification(gimbal_lock_sine(params.sequence, theta)),
             "quaternion_gain": 0.5,
             "rate": state.rate,
             "speed": state.speed,

@@ -7,10 +7,10 @@ import numpy as np
 
 from labs.algorithms.frame_chain import FrameChain
 from labs.algorithms.orientation import SEQUENCES
-from labs.models.arms import load
+from labs.models.arms import load_arm
 from labs.params import Group, Params
 from labs.reactive_control.kinematics.gimbal import Gimbal
-from labs.tasks.arm.params import MAX_JOINTS, having_joint, joint_values, robot_choice
+from labs.tasks.arm.params import MAX_JOINTS, joint_values, robot_choice, where_joint_exists
 
 ROBOTS = ("ur5", "panda")
 
@@ -30,7 +30,7 @@ def _angle(i: int, default: float) -> Any:
         "rad",
         step=0.01,
         key=True,
-        when=having_joint(i, ROBOTS),
+        when=where_joint_exists(i, ROBOTS),
         help=f"Angle of joint {i}. The robot stops at its own limits.",
     )
 
@@ -83,7 +83,7 @@ class KinematicsParams(Params):
     @property
     def q(self) -> np.ndarray:
         """(n,) [rad]: the sliders of the robot's joints, within its limits."""
-        model = load(self.robot).model
+        model = load_arm(self.robot).model
         low, high = model.lowerPositionLimit, model.upperPositionLimit
         q: np.ndarray = np.clip(self.sliders[: model.nq], low, high)
         return q
@@ -91,7 +91,7 @@ class KinematicsParams(Params):
     def shown(self, moved: int) -> int:
         """The factor shown, from 1 to n."""
         wanted = moved if self.factor == "moved" else int(self.factor)
-        return min(wanted, int(load(self.robot).model.nq))
+        return min(wanted, int(load_arm(self.robot).model.nq))
 
     @property
     def chain(self) -> FrameChain:
@@ -105,5 +105,5 @@ class KinematicsParams(Params):
 
 @cache
 def _frame_chain(robot: str) -> FrameChain:
-    arm = load(robot)
+    arm = load_arm(robot)
     return FrameChain(arm.model, arm.tip)

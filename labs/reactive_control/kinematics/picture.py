@@ -3,8 +3,8 @@
 import numpy as np
 import pinocchio as pin
 
-from labs.algorithms.orientation import lost_direction
-from labs.models.arms import load
+from labs.algorithms.orientation import gimbal_lock_direction
+from labs.models.arms import load_arm
 from labs.reactive_control.kinematics.gimbal import Gimbal
 from labs.reactive_control.kinematics.params import KinematicsParams
 from labs.scene import Scene
@@ -23,7 +23,7 @@ RING_RADII = (0.2, 0.17)
 
 def draw_arm(scene: Scene, params: KinematicsParams, shown: int) -> None:
     """The arm and its frames, that of the factor shown, from 1, longer."""
-    arm, q = load(params.robot), params.q
+    arm, q = load_arm(params.robot), params.q
     scene.camera(*CAMERA[params.robot])
     scene.arm("robot", arm, q, ghost=params.translucent)
     placement = np.eye(4)
@@ -45,5 +45,5 @@ def draw_gimbal(scene: Scene, gimbal: Gimbal, rotation: np.ndarray) -> None:
     for symbol, place in (("φ", 1.35 * first), ("θ", 1.2 * second), ("ψ", 1.15 * third)):
         scene.label(symbol, symbol, GIMBAL_CENTER + RING_RADII[0] * place)
     scene.frame("body", pin.SE3(rotation, GIMBAL_CENTER), 0.13)
-    lost = lost_direction(gimbal.sequence, gimbal.angles(rotation)[0])
+    lost = gimbal_lock_direction(gimbal.sequence, gimbal.angles(rotation)[0])
     scene.arrow("lost", GIMBAL_CENTER, GIMBAL_CENTER + 0.28 * lost, "warning")

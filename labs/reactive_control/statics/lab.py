@@ -19,7 +19,7 @@ FORCE_ARROW = 1.0 / 600.0
 """[m/N] length of the force's arrow."""
 VELOCITY_ARROW = 0.6
 """[s] length of the velocity's arrow over the velocity."""
-FULL_MOMENT = 40.0
+FULL_ARC_MOMENT = 40.0
 """[N m] whose arc is as long as that of a torque at its limit."""
 NO_FORCE = 1e-9
 """[N] forces below are none."""
@@ -38,7 +38,7 @@ class StaticsState(State):
 
 
 @dataclass(frozen=True)
-class Load:
+class StaticLoad:
     """An arm under a wrench: tau = J(q)^T w (1.1.4)."""
 
     tip: np.ndarray
@@ -124,7 +124,7 @@ class Statics(Lab[StaticsParams, StaticsState]):
 
     def measure(self, params: StaticsParams, state: StaticsState) -> Measurement:
         """Torque, and the power reckoned at the joints and at the end-effector."""
-        load = _load(params)
+        load = _static_load(params)
         tau, dq = load.torque, params.dq
         twist = load.jacobian @ dq
         joint_power, tip_power = float(tau @ dq), float(load.wrench @ twist)
@@ -147,7 +147,7 @@ class Statics(Lab[StaticsParams, StaticsState]):
     def fields(self, params: StaticsParams, state: StaticsState) -> Mapping[str, np.ndarray]:
         """J^T, its torque, and the singular values of J_p: |tau| for a force of 1 N along each
         of the three main directions of the force ellipsoid, the dearest first."""
-        load = _load(params)
+        load = _static_load(params)
         return {
             "torque": load.torque,
             "torque_limit": plant(params.robot).arm.torque_limit,
@@ -157,7 +157,7 @@ class Statics(Lab[StaticsParams, StaticsState]):
 
     def draw(self, scene: Scene, params: StaticsParams, state: StaticsState) -> None:
         """The arm, the wrench, and a torque arc at every joint, red beyond the motor's limit."""
-        load, world = _load(params), plant(params.robot)
+        load, world = _static_load(params), plant(params.robot)
         arm, tau, tip = world.arm, load.torque, load.tip
         scene.camera(*CAMERA[params.robot])
         scene.arm("robot", arm, params.q, effort=np.abs(tau) / arm.torque_limit)
@@ -166,7 +166,7 @@ class Statics(Lab[StaticsParams, StaticsState]):
         if np.linalg.norm(end - tip) > 0.01:
             scene.arrow("force", tip, end)
         if (moment := _norm(params.moment)) > 0.01:
-            angle = min(FULL_ARC * moment / FULL_MOMENT, LONGEST_ARC)
+            angle = min(FULL_ARC * moment / FULL_ARC_MOMENT, LONGEST_ARC)
             scene.arc("moment", tip, params.moment / moment, angle, 0.1, "reference")
         velocity = VELOCITY_ARROW * (load.jacobian[:3] @ params.dq)
         if np.linalg.norm(velocity) > 0.01:
@@ -177,7 +177,7 @@ class Statics(Lab[StaticsParams, StaticsState]):
         scene.handle("pull", end, 0.04)
 
 
-def _load(params: StaticsParams) -> Load:
+def _static_load(params: StaticsParams) -> StaticLoad:
     world = plant(params.robot)
     axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
     tip = world.tip(params.q)
@@ -185,7 +185,7 @@ def _load(params: StaticsParams) -> Load:
         world.model, world.data, params.q, world.arm.tip, axes
     ).copy()
     wrench = np.concatenate([params.force, params.moment])
-    return Load(tip, jacobian, wrench)
+    return StaticLoad(tip, jacobian, wrench)
 
 
 def _norm(vector: np.ndarray) -> float:

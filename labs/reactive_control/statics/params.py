@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from labs.models.arms import load
+from labs.models.arms import load_arm
 from labs.params import Group, Params
-from labs.tasks.arm.params import having_joint, joint_values, offset_knob, robot_choice
+from labs.tasks.arm.params import joint_values, offset_knob, robot_choice, where_joint_exists
 from labs.tasks.arm.postures import POSED_ARMS, POSTURES, posture
 
 POSTURE = Group("Posture")
@@ -23,7 +23,7 @@ def _speed(joint: int, default: float = 0.0) -> Any:
         "rad/s",
         f"Joint {joint}",
         step=0.01,
-        when=having_joint(joint),
+        when=where_joint_exists(joint),
         help="The motion whose power is reckoned; the arm itself stays where it is.",
     )
 
@@ -93,7 +93,7 @@ class StaticsParams(Params):
     @property
     def dq(self) -> np.ndarray:
         """q' (nv,) [rad/s]."""
-        return joint_values(self, "dq", load(self.robot).model.nv)
+        return joint_values(self, "dq", load_arm(self.robot).model.nv)
 
     @property
     def force(self) -> np.ndarray:

@@ -26,28 +26,28 @@ import numpy as np
 from labs.algorithms.bandits import Bandits, Players, gaussian_testbed, init, step
 from labs.algorithms.exploration import BehaviourPolicy
 from labs.problems.episodes import UpdateRule
-from labs.reinforcement_learning.bandits.params import TASKS, BanditParams
-from labs.resumable import Resumable, pieces
+from labs.reinforcement_learning.bandits.params import TASK_COUNT, BanditParams
+from labs.resumable import Resumable, split_work
 
 Game = Mapping[str, np.ndarray]
 GREEDY, NO_LEARNING = BehaviourPolicy(epsilon=0.0), UpdateRule(alpha=0.0)
 """In the test."""
-COST = 20
+OPERATIONS_PER_ARM = 20
 """Operations for a door of a task at each turn, at most about."""
-_CARRIED = ("q", "visits", "means", "largest", "regret")
+_PLAYER_ARRAYS = ("q", "visits", "means", "largest", "regret")
 
 
-def deal(params: BanditParams, rng: np.random.Generator) -> Game:
+def initial_game(params: BanditParams, rng: np.random.Generator) -> Game:
     """The tasks before the first turn."""
-    means = gaussian_testbed(TASKS, 10, rng).means
+    means = gaussian_testbed(TASK_COUNT, 10, rng).means
     if params.world == "doors":
-        means = np.tile([params.left, params.right], (TASKS, 1))
+        means = np.tile([params.left, params.right], (TASK_COUNT, 1))
     players = init(bandits_of(params, means), rng, params.q0)
-    begun = {"begun": means, "luck": np.stack([players.random, players.luck], axis=1)}
-    return restart(params, begun)
+    begun = {"begun": means, "luck": np.stack([players.random, players.task_random], axis=1)}
+    return reset_game(params, begun)
 
 
-def restart(params: BanditParams, game: Mapping[str, np.ndarray]) -> Game:
+def reset_game(params: BanditParams, game: Mapping[str, np.ndarray]) -> Game:
     """The same tasks and the same luck, before the first turn."""
     means, luck = game["begun"], game["luck"]
     players = len(params.strategies)
@@ -70,14 +70,14 @@ def restart(params: BanditParams, game: Mapping[str, np.ndarray]) -> Game:
     }
 
 
-def alone(params: BanditParams, game: Game, m: int) -> Game:
+def single_task_game(params: BanditParams, game: Game, m: int) -> Game:
     """Task m by itself, before the first turn."""
-    return restart(params, {name: game[name][m : m + 1] for name in ("begun", "luck")})
+    return reset_game(params, {name: game[name][m : m + 1] for name in ("begun", "luck")})
 
 
 def play(params: BanditParams, game: Game, turns: int) -> Resumable[Game]:
     """The game after so many further turns of all."""
-    lessons = min(max(params.lessons - game["regrets"].shape[1], 0), turns)
+    lessons = min(max(params.training_turns - game["regrets"].shape[1], 0), turns)
     for many, test in ((lessons, False), (turns - lessons, True)):
         if many:
             game = yield from _play(params, game, many, test)
@@ -91,14 +91,14 @@ def _play(params: BanditParams, game: Game, turns: int, test: bool) -> Resumable
         measured = params.measured and strategy == "bound" and not test
         behaviour = GREEDY if test else params.behaviour(strategy)
         one, regrets, best = _players(game, p), [], []
-        for some in pieces(turns, COST * game["begun"].size):
+        for some in split_work(turns, OPERATIONS_PER_ARM * game["begun"].size):
             one = step(bandits, behaviour, rule, one, some, measured)
             regrets.append(one.regrets)
             best.append(one.best)
             yield
         after.append(replace(one, regrets=np.hstack(regrets), best=np.hstack(best)))
-    carried = {name: np.stack([getattr(one, name) for one in after]) for name in _CARRIED}
-    random = np.stack([np.stack([one.random, one.luck], axis=1) for one in after])
+    carried = {name: np.stack([getattr(one, name) for one in after]) for name in _PLAYER_ARRAYS}
+    random = np.stack([np.stack([one.random, one.task_random], axis=1) for one in after])
     played = game["regrets"].shape[1] + turns
     return {
         **game,
@@ -128,14 +128,14 @@ def bandits_of(params: BanditParams, means: np.ndarray) -> Bandits:
 
 def _players(game: Game, p: int) -> Players:
     none = np.zeros(0)
-    carried = {name: game[name][p] for name in _CARRIED}
+    carried = {name: game[name][p] for name in _PLAYER_ARRAYS}
     random = np.ascontiguousarray(game["random"][p].transpose(1, 0, 2))
     turns = game["regrets"].shape[1]
     return Players(
         **carried,
         turns=turns,
         random=random[0],
-        luck=random[1],
+        task_random=random[1],
         costs=none,
         regrets=none,
         best=none,

@@ -8,10 +8,16 @@ import numpy as np
 
 from labs.lab import Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
-from labs.reinforcement_learning.bandits.game import Game, alone, deal, play, restart
+from labs.reinforcement_learning.bandits.game import (
+    Game,
+    initial_game,
+    play,
+    reset_game,
+    single_task_game,
+)
 from labs.reinforcement_learning.bandits.params import STRATEGIES, BanditParams
 from labs.reinforcement_learning.bandits.picture import draw_doors
-from labs.reinforcement_learning.bandits.plots import ORDER, PLOTS, curves, numbers
+from labs.reinforcement_learning.bandits.plots import ORDER, PLOTS, regret_curves, regret_readouts
 from labs.resumable import run_to_completion
 from labs.scene import Scene
 
@@ -27,7 +33,7 @@ class BanditState(State):
     live: Game
     opened: np.ndarray
     """(P,) int: the doors opened last in the slow game; -1 before the first turn."""
-    rules: tuple[Value, ...]
+    game_key: tuple[Value, ...]
     """What it is played by."""
     wait: float = 0.0
     """The part of a turn since then."""
@@ -54,27 +60,27 @@ class BanditsLab(Lab[BanditParams, BanditState]):
     }
 
     def init(self, params: BanditParams, rng: np.random.Generator) -> BanditState:
-        game = deal(params, rng)
-        live = alone(params, game, params.shown)
-        return BanditState(game=game, live=live, opened=_none(live), rules=params.rules)
+        game = initial_game(params, rng)
+        live = single_task_game(params, game, params.shown)
+        return BanditState(game=game, live=live, opened=_no_choices(live), game_key=params.game_key)
 
     def step(self, params: BanditParams, inputs: Inputs, state: BanditState) -> BanditState:
         """The slow game; from its first turn on where other rules hold."""
         live, opened, wait = state.live, state.opened, state.wait + params.pace * self.period
-        if state.rules != params.rules:
-            live, wait = alone(params, state.game, params.shown), 0.0
-            opened = _none(live)
-        if wait >= 1.0 and live["regrets"].shape[1] < params.length:
+        if state.game_key != params.game_key:
+            live, wait = single_task_game(params, state.game, params.shown), 0.0
+            opened = _no_choices(live)
+        if wait >= 1.0 and live["regrets"].shape[1] < params.total_turns:
             after = run_to_completion(play(params, live, 1))
             opened = (after["visits"] - live["visits"])[:, 0].argmax(axis=1)
             live, wait = after, wait - 1.0
         wait = min(wait, 1.0)
         t = state.t + self.period
-        return replace(state, t=t, live=live, opened=opened, wait=wait, rules=params.rules)
+        return replace(state, t=t, live=live, opened=opened, wait=wait, game_key=params.game_key)
 
     def solve(self, params: BanditParams, state: BanditState) -> Iterator[Snapshot | None]:
         """From the first turn on: some turns an iteration."""
-        game, turns = restart(params, state.game), params.length
+        game, turns = reset_game(params, state.game), params.total_turns
         for i in range(1, BATCHES + 1):
             game = yield from play(params, game, i * turns // BATCHES - game["regrets"].shape[1])
             done = f"{turns} turns of {len(game['begun'])} players each." if i == BATCHES else ""
@@ -84,10 +90,10 @@ class BanditsLab(Lab[BanditParams, BanditState]):
         return replace(state, game=snapshot.data)
 
     def measure(self, params: BanditParams, state: BanditState) -> Measurement:
-        return numbers(params, state.game)
+        return regret_readouts(params, state.game)
 
     def fields(self, params: BanditParams, state: BanditState) -> Mapping[str, np.ndarray]:
-        return curves(params, state.game)
+        return regret_curves(params, state.game)
 
     def labels(self, params: BanditParams) -> Mapping[str, str | tuple[str, ...]]:
         many = 2 if params.world == "doors" else 10
@@ -107,5 +113,5 @@ class BanditsLab(Lab[BanditParams, BanditState]):
         next(snapshot for snapshot in work if snapshot is not None)
 
 
-def _none(live: Game) -> np.ndarray:
+def _no_choices(live: Game) -> np.ndarray:
     return np.full(len(live["q"]), -1)

@@ -3,12 +3,12 @@
 from labs.algorithms.bandits import SAMPLE_MEAN
 from labs.algorithms.exploration import (
     BOLTZMANN,
-    CONFIDENCE,
+    CONFIDENCE_BOUND,
     EPSILON_GREEDY,
     THOMPSON,
     BehaviourPolicy,
 )
-from labs.params import Group, Params, Value, When
+from labs.params import Condition, Group, Params, Value
 from labs.problems.episodes import UpdateRule
 
 STRATEGIES = {
@@ -22,11 +22,11 @@ STRATEGIES = {
 }
 KINDS = {"online": "Online", "active": "Active", "offline": "Non-interactive"}
 """Of learning (notes, 3.6.1)."""
-TESTED = ("active", "offline")
+KINDS_WITH_TEST = ("active", "offline")
 """Those in which a test follows, and it alone counts."""
-TASKS = 1000
+TASK_COUNT = 1000
 """Played at once by each strategy."""
-SHOWN = 20
+SELECTABLE_TASKS = 20
 """Of them can be looked at."""
 
 WORLD = Group("Doors", effect="restart")
@@ -38,7 +38,7 @@ VIEW = Group("View")
 DOORS = {"world": "doors"}
 
 
-def _played(strategy: str) -> When:
+def _if_strategy(strategy: str) -> Condition:
     """Where somebody plays this."""
     return *({name: [strategy]} for name in ("first", "second")), {"everybody": [True]}
 
@@ -75,11 +75,11 @@ class BanditParams(Params):
         "Chance of any door",
         step=0.01,
         key=True,
-        when=_played("epsilon"),
+        when=_if_strategy("epsilon"),
     )
     """Of ε-greedy, at each turn alike."""
     decay: float = STRATEGY.knob(
-        0.7, 0.05, 1.0, "d", "", "Decay", step=0.05, key=True, when=_played("decaying")
+        0.7, 0.05, 1.0, "d", "", "Decay", step=0.05, key=True, when=_if_strategy("decaying")
     )
     """At turn t any door is opened with probability 1/t^d."""
     beta: float = STRATEGY.knob(
@@ -91,14 +91,14 @@ class BanditParams(Params):
         "Inverse temperature",
         scale="log",
         key=True,
-        when=_played("boltzmann"),
+        when=_if_strategy("boltzmann"),
     )
     """0 tries all alike, large is greedy."""
     bound: float = STRATEGY.knob(
-        1.0, 0.0, 10.0, "L", "", "Confidence", step=0.1, key=True, when=_played("bound")
+        1.0, 0.0, 10.0, "L", "", "Confidence", step=0.1, key=True, when=_if_strategy("bound")
     )
     """Width of the confidence bound, in units of cost."""
-    measured: bool = STRATEGY.toggle(False, "L = largest |l| so far", when=_played("bound"))
+    measured: bool = STRATEGY.toggle(False, "L = largest |l| so far", when=_if_strategy("bound"))
     """The safe choice, where costs are bounded: instead of the slider."""
     turns: float = STRATEGY.knob(1000, 100, 5000, "T", "", "Turns", scale="log")
     """Doors that are opened before any test."""
@@ -112,7 +112,7 @@ class BanditParams(Params):
     """How far a new cost moves its estimate."""
     pace: float = VIEW.knob(5, 1, 50, "f", "1/s", "Turns a second", scale="log", step=1)
     """In the scene, where one of the tasks is played slowly."""
-    task: float = VIEW.knob(1, 1, SHOWN, "m", "", "Task shown", step=1)
+    task: float = VIEW.knob(1, 1, SELECTABLE_TASKS, "m", "", "Task shown", step=1)
     """Of a thousand that are played at once."""
 
     @property
@@ -131,19 +131,19 @@ class BanditParams(Params):
         return tuple(names)
 
     @property
-    def rules(self) -> tuple[Value, ...]:
+    def game_key(self) -> tuple[Value, ...]:
         """All that a game depends on, and the task shown of it."""
         return tuple(value for name, value in self.model_dump().items() if name != "pace")
 
     @property
-    def lessons(self) -> int:
+    def training_turns(self) -> int:
         """T"""
         return round(self.turns)
 
     @property
-    def length(self) -> int:
+    def total_turns(self) -> int:
         """Turns of a game: with a test, as many again."""
-        return self.lessons * (2 if self.kind in TESTED else 1)
+        return self.training_turns * (2 if self.kind in KINDS_WITH_TEST else 1)
 
     @property
     def rule(self) -> UpdateRule:
@@ -157,7 +157,7 @@ class BanditParams(Params):
             "epsilon": BehaviourPolicy(epsilon=self.epsilon),
             "decaying": BehaviourPolicy(EPSILON_GREEDY, epsilon=1.0, decay=self.decay),
             "boltzmann": BehaviourPolicy(BOLTZMANN, beta=self.beta),
-            "bound": BehaviourPolicy(CONFIDENCE, bound=self.bound),
+            "bound": BehaviourPolicy(CONFIDENCE_BOUND, bound=self.bound),
             # Who knows how much luck there is; without any there is nothing to doubt.
             "thompson": BehaviourPolicy(THOMPSON, bound=self.deviation),
             "uniform": BehaviourPolicy(epsilon=1.0),

@@ -9,7 +9,7 @@ player's colour, and so is a dot, what it cost; grey where that does not count."
 import numpy as np
 
 from labs.reinforcement_learning.bandits.game import Game
-from labs.reinforcement_learning.bandits.params import TESTED, BanditParams
+from labs.reinforcement_learning.bandits.params import KINDS_WITH_TEST, BanditParams
 from labs.scene import Color, Scene
 
 DEPTH = 0.012
@@ -32,21 +32,21 @@ def draw_doors(scene: Scene, params: BanditParams, game: Game, opened: np.ndarra
     width, spacing = (0.3, 0.42) if len(means) > 2 else (0.6, 1.0)
     across = spacing * (np.arange(len(means)) - 0.5 * (len(means) - 1))
     door = (_height(min(low, -3.0)) - 0.12, _height(max(high, 3.0)) + 0.12)
-    turn, counts = _turn(params, game["regrets"].shape[1])
+    turn, counts = _turn_label(params, game["regrets"].shape[1])
     for k, x in enumerate(across):
         sides = (x - 0.5 * width, x + 0.5 * width)
-        _panel(scene, f"door {k + 1}", sides, door, DEPTH, 0.12)
+        _draw_panel(scene, f"door {k + 1}", sides, door, DEPTH, 0.12)
         costs = (_height(means[k] - spread), _height(means[k] + spread))
         if costs[1] - costs[0] > 1e-3:
-            _panel(scene, f"costs {k + 1}", sides, costs, 0.5 * DEPTH, 0.3)
+            _draw_panel(scene, f"costs {k + 1}", sides, costs, 0.5 * DEPTH, 0.3)
         best = means[k] == means.min()
         mean = [(side, 0.0, _height(means[k])) for side in sides]
         scene.trail(f"mean {k + 1}", np.array(mean), "force" if best else "muted")
         for p, color in enumerate(COLORS):
             beside = x + (0.25 if p else -0.25) * width
-            _estimate(scene, params, game, (p, k), beside, door)
+            _draw_estimate(scene, params, game, (p, k), beside, door)
             if opened[p] == k:
-                _frame(scene, f"opened {p + 1}", sides, door, 0.02 * (1 + p), color)
+                _draw_frame(scene, f"opened {p + 1}", sides, door, 0.02 * (1 + p), color)
                 paid = (beside, -2.0 * DEPTH, _height(float(game["costs"][p])))
                 scene.dots(f"paid {p + 1}", np.array([paid]), 0.05, color if counts else "muted")
         times = "/".join(str(n) for n in game["visits"][:2, 0, k])
@@ -62,10 +62,10 @@ def draw_doors(scene: Scene, params: BanditParams, game: Game, opened: np.ndarra
     scene.camera((0.0, -away, middle + 0.06 * away), (0.0, 0.0, middle), core)
 
 
-def _turn(params: BanditParams, turn: int) -> tuple[str, bool]:
+def _turn_label(params: BanditParams, turn: int) -> tuple[str, bool]:
     """What is said of a turn, and whether its cost counts."""
-    test, many = turn - params.lessons, params.lessons
-    if params.kind not in TESTED:
+    test, many = turn - params.training_turns, params.training_turns
+    if params.kind not in KINDS_WITH_TEST:
         return f"turn {turn} of {many}", True
     if test > 0:
         return f"test {test} of {many}: counts", True
@@ -73,7 +73,7 @@ def _turn(params: BanditParams, turn: int) -> tuple[str, bool]:
     return f"lesson {turn} of {many}: {who}", False
 
 
-def _estimate(
+def _draw_estimate(
     scene: Scene, params: BanditParams, game: Game, who: tuple[int, int], x: float, door: Span
 ) -> None:
     """What player p thinks of door k."""
@@ -97,13 +97,13 @@ def _height(cost: float) -> float:
     return float(SCALE * (np.clip(cost, LOWEST, HIGHEST) - LOWEST))
 
 
-def _panel(
+def _draw_panel(
     scene: Scene, name: str, sides: Span, heights: Span, behind: float, opacity: float
 ) -> None:
     scene.polygon(name, _corners(sides, heights, behind)[:4], "muted", opacity)
 
 
-def _frame(
+def _draw_frame(
     scene: Scene, name: str, sides: Span, heights: Span, outside: float, color: Color
 ) -> None:
     wider = (sides[0] - outside, sides[1] + outside)

@@ -4,14 +4,14 @@ import numpy as np
 
 from labs.plots import Bars, Curves, Plot, Readout, Trace
 from labs.reinforcement_learning.bandits.game import Game
-from labs.reinforcement_learning.bandits.params import TESTED, BanditParams
+from labs.reinforcement_learning.bandits.params import KINDS_WITH_TEST, BanditParams
 
 ORDER = ("first", "second")
 WINDOW = 20
 """Turns over which the share of best choices is averaged."""
 POINTS = 500
 """Of a curve over turns, at most."""
-WITH_TEST = {"kind": TESTED}
+WITH_TEST = {"kind": KINDS_WITH_TEST}
 
 
 def _curves(title: str, x: str, y: str, x_label: str, y_label: str) -> Curves:
@@ -39,20 +39,23 @@ PLOTS: tuple[Plot, ...] = (
 )
 
 
-def counted(params: BanditParams, game: Game) -> np.ndarray:
+def counted_regret(params: BanditParams, game: Game) -> np.ndarray:
     """(P, t) the part of the mean regret that counts: online all of it, else that of the test."""
-    regrets, lessons = game["regrets"], params.lessons
-    if params.kind not in TESTED:
+    regrets, lessons = game["regrets"], params.training_turns
+    if params.kind not in KINDS_WITH_TEST:
         return regrets
     before = regrets[:, min(lessons, regrets.shape[1]) - 1, None] if regrets.size else 0.0
     return np.asarray(np.maximum(regrets - before, 0.0))
 
 
-def numbers(params: BanditParams, game: Game) -> dict[str, float]:
+def regret_readouts(params: BanditParams, game: Game) -> dict[str, float]:
     """The tiles: where the game stands."""
     shown = {"turn": float(game["regrets"].shape[1])}
     if shown["turn"]:
-        counts, taught = counted(params, game)[:, -1], game["regrets"][:, : params.lessons][:, -1]
+        counts, taught = (
+            counted_regret(params, game)[:, -1],
+            game["regrets"][:, : params.training_turns][:, -1],
+        )
         for p, name in enumerate(ORDER):
             shown[f"counted_{name}"] = float(counts[p])
             shown[f"lessons_{name}"] = float(taught[p])
@@ -61,7 +64,7 @@ def numbers(params: BanditParams, game: Game) -> dict[str, float]:
     return shown
 
 
-def curves(params: BanditParams, game: Game) -> dict[str, np.ndarray]:
+def regret_curves(params: BanditParams, game: Game) -> dict[str, np.ndarray]:
     """All curves; the choices in one task."""
     turns = game["regrets"].shape[1]
     every = np.arange(0, turns, max(1, -(-turns // POINTS)))
@@ -70,8 +73,8 @@ def curves(params: BanditParams, game: Game) -> dict[str, np.ndarray]:
         "after": game["after"],
         "share": np.linspace(0.0, 100.0, game["regret"].shape[1]),
         "regret": game["regrets"][:, every].T,
-        "counted": counted(params, game)[:, every].T,
-        "best": 100.0 * _smooth(game["best"])[:, every].T,
+        "counted": counted_regret(params, game)[:, every].T,
+        "best": 100.0 * _moving_average(game["best"])[:, every].T,
         "sorted": np.sort(game["regret"]).T,
         "simple": game["simple"].T,
     }
@@ -80,7 +83,7 @@ def curves(params: BanditParams, game: Game) -> dict[str, np.ndarray]:
     return found
 
 
-def _smooth(curves: np.ndarray) -> np.ndarray:
+def _moving_average(curves: np.ndarray) -> np.ndarray:
     """Each point of curves (P, t) the mean of itself and up to WINDOW - 1 before it."""
     sums = np.pad(np.cumsum(curves, axis=1), ((0, 0), (1, 0)))
     end = np.arange(1, curves.shape[1] + 1)

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 from scipy.linalg import solve_continuous_are
 
-from labs.algorithms.dqn import choose
+from labs.algorithms.dqn import epsilon_greedy
 from labs.reinforcement_learning.dqn.optimal_table import best_controls
 from labs.reinforcement_learning.dqn.tasks import RobotTask, learning_task
 
@@ -20,17 +20,19 @@ CONTROLLERS = {
     "table": "Optimal table",
     "energy": "Energy, then LQR",
 }
-PUMP = 10.0
+ENERGY_GAIN = 10.0
 """k [1]"""
 STATE_WEIGHTS, TORQUE_WEIGHT = np.diag([1.0, 0.1]), np.eye(1)
 """Of LQR: [1/rad^2, s^2/rad^2], [1/(N m)^2]."""
-NO_LUCK = np.ones(4, np.uint64)
+UNUSED_RANDOM = np.ones(4, np.uint64)
 """A greedy policy draws nothing."""
 
 
 def network_controller(task: RobotTask, sizes: np.ndarray, w: np.ndarray) -> Controller:
     """u = argmin_u Q(x, u, w)"""
-    return lambda X: task.torques[choose(sizes, w, task.robot.observe(X), 0.0, NO_LUCK)]
+    return lambda X: task.torques[
+        epsilon_greedy(sizes, w, task.robot.observe(X), 0.0, UNUSED_RANDOM)
+    ]
 
 
 def table_controller() -> Controller:
@@ -50,7 +52,7 @@ def energy_controller() -> Controller:
     the ellipse would be missed between two decisions."""
     task = learning_task("pendulum")
     inertia, gravity = task.robot.dynamics.inertia[0], task.robot.dynamics.gravity[0, 1]
-    limit = task.largest
+    limit = task.max_torque
     A, B = np.array([[0.0, 1.0], [gravity / inertia, 0.0]]), np.array([[0.0], [1.0 / inertia]])
     P = solve_continuous_are(A, B, STATE_WEIGHTS, TORQUE_WEIGHT)
     K = B.T @ P / TORQUE_WEIGHT
@@ -62,7 +64,7 @@ def energy_controller() -> Controller:
         energy = 0.5 * inertia * x[:, 1] ** 2 + gravity * (np.cos(e) - 1.0)
         along = np.where(x[:, 1] < 0.0, -1.0, 1.0)
         near = np.einsum("ki,ij,kj->k", x, P, x) <= level
-        u = np.where(near, -(x @ K[0]), -np.clip(PUMP * energy * along, -limit, limit))
+        u = np.where(near, -(x @ K[0]), -np.clip(ENERGY_GAIN * energy * along, -limit, limit))
         return np.asarray(u[:, None])
 
     return torque
@@ -74,15 +76,15 @@ def mean_cost(task: RobotTask, controller: Controller, X: np.ndarray) -> float:
     for _ in range(task.robot.horizon):
         torques = controller(X)
         total += float(task.robot.cost(X, torques).mean())
-        X = task.robot.hold(X, torques)
+        X = task.robot.integrate(X, torques)
     return total
 
 
 @cache
-def compared() -> tuple[float, float]:
+def baseline_costs() -> tuple[float, float]:
     """What an episode of the pendulum costs by the optimal table, and by energy, on average over
     the starts that greedy policies are tried from."""
     task = learning_task("pendulum")
     both = (table_controller(), energy_controller())
-    table, energy = (mean_cost(task, controller, task.tests()) for controller in both)
+    table, energy = (mean_cost(task, controller, task.test_states()) for controller in both)
     return table, energy

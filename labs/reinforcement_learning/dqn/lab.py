@@ -12,25 +12,37 @@ from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
 from labs.reinforcement_learning.dqn.controllers import (
     Controller,
-    compared,
+    baseline_costs,
     energy_controller,
     network_controller,
     table_controller,
 )
-from labs.reinforcement_learning.dqn.drive import Drive, aim, begin, drive, push
+from labs.reinforcement_learning.dqn.driven_robot import (
+    DrivenRobot,
+    advance_robot,
+    apply_push,
+    initial_robot,
+    set_target,
+)
 from labs.reinforcement_learning.dqn.params import DqnParams
 from labs.reinforcement_learning.dqn.picture import draw_learned, draw_target
-from labs.reinforcement_learning.dqn.plots import PLOTS, curves, maps, table_map, value_map
+from labs.reinforcement_learning.dqn.plots import (
+    PLOTS,
+    learning_curves,
+    map_fields,
+    table_map,
+    value_map,
+)
 from labs.reinforcement_learning.dqn.tasks import learning_task, posture_at
 from labs.reinforcement_learning.dqn.training import (
     agent_of,
     initial_training,
-    sound,
+    is_finite,
     train,
 )
 from labs.scene import Scene
 from labs.tasks.environments.reach import reach
-from labs.tasks.environments.torque_task import PERIOD, SUBSTEPS
+from labs.tasks.environments.torque_task import CONTROL_PERIOD, SUBSTEPS
 
 PUSH = 3.0
 """[rad/s]"""
@@ -41,7 +53,7 @@ class DqnState(State):
     """What was learned, and a robot that shows it."""
 
     training: Training
-    drive: Drive
+    drive: DrivenRobot
 
 
 class Dqn(Lab[DqnParams, DqnState]):
@@ -54,7 +66,7 @@ class Dqn(Lab[DqnParams, DqnState]):
         "the robot tries its present policy. Take its replay or its fixed targets away and see."
     )
     Params = DqnParams
-    period = PERIOD / SUBSTEPS
+    period = CONTROL_PERIOD / SUBSTEPS
     plots = PLOTS
     presets: ClassVar[Mapping[str, Mapping[str, Value]]] = {
         "Pendulum": {},
@@ -84,7 +96,7 @@ class Dqn(Lab[DqnParams, DqnState]):
     def init(self, params: DqnParams, rng: np.random.Generator) -> DqnState:
         task = params.task
         training = initial_training(task, params.network, round(params.learners), rng)
-        return DqnState(training=training, drive=begin(task))
+        return DqnState(training=training, drive=initial_robot(task))
 
     def step(self, params: DqnParams, inputs: Inputs, state: DqnState) -> DqnState:
         """12.5 ms under the greedy policy of the moment."""
@@ -92,24 +104,24 @@ class Dqn(Lab[DqnParams, DqnState]):
             return state
         task, at = params.task, state.drive
         if params.system == "ur5":
-            at = aim(at, posture_at(params.target_x, params.target_z))
+            at = set_target(at, posture_at(params.target_x, params.target_z))
         if "push" in inputs.actions:
-            at = push(task, at, PUSH)
-        at = drive(task, _controller(params, state), at)
+            at = apply_push(task, at, PUSH)
+        at = advance_robot(task, _controller(params, state), at)
         return replace(state, t=state.t + self.period, drive=at)
 
     def solve(self, params: DqnParams, state: DqnState) -> Iterator[Snapshot | None]:
         """Some rounds of all robots an iteration; goes on from what was learned."""
         task, options, training = params.task, params.options, state.training
-        begun, wanted, i, done = _steps(training), round(params.steps), 0, ""
+        begun, wanted, i, done = _step_count(training), round(params.steps), 0, ""
         while not done:
             after, i = (yield from train(task, options, training)), i + 1
-            if not sound(after):
-                yield Snapshot(i, training, DIVERGED)
+            if not is_finite(after):
+                yield Snapshot(i, training, DIVERGENCE_MESSAGE)
                 return
-            training, made = after, _steps(after) - begun
+            training, made = after, _step_count(after) - begun
             if made >= wanted:
-                done = f"{_steps(training)} steps of each learner done."
+                done = f"{_step_count(training)} steps of each learner done."
             yield Snapshot(i, training, done, min(1.0, made / wanted))
 
     def accept(self, params: DqnParams, state: DqnState, snapshot: Snapshot) -> DqnState:
@@ -129,15 +141,15 @@ class Dqn(Lab[DqnParams, DqnState]):
         measured: dict[str, float | np.ndarray] = {
             "q": at.x[: task.joints],
             "u": at.torque,
-            "steps": float(_steps(training)),
+            "steps": float(_step_count(training)),
             "updates": float(training["last_updates"][s]),
-            "epsilon": dqn.epsilon(params.options, _steps(training)),
+            "epsilon": dqn.epsilon(params.options, _step_count(training)),
         }
         if training["tried"].size:
             measured["greedy"] = float(training["greedy"][s, -1])
             measured["best"] = float(training["best_cost"][s])
         if params.system == "pendulum":
-            measured["table"], measured["energy"] = compared()
+            measured["table"], measured["energy"] = baseline_costs()
         if params.system == "ur5":
             tips = reach().tips(np.stack([at.x[:2], at.x[4:]]))
             measured["distance"] = float(np.linalg.norm(tips[0] - tips[1]))
@@ -145,9 +157,9 @@ class Dqn(Lab[DqnParams, DqnState]):
 
     def fields(self, params: DqnParams, state: DqnState) -> Mapping[str, np.ndarray]:
         s, training = params.shown, state.training
-        others = compared() if params.system == "pendulum" else None
-        shown = maps(params.task, training, s, _shown_map(params, state))
-        return shown | curves(training, s, others)
+        others = baseline_costs() if params.system == "pendulum" else None
+        shown = map_fields(params.task, training, s, _shown_map(params, state))
+        return shown | learning_curves(training, s, others)
 
     def labels(self, params: DqnParams) -> Mapping[str, str | tuple[str, ...]]:
         across, up = params.task.axes
@@ -165,23 +177,23 @@ class Dqn(Lab[DqnParams, DqnState]):
         lab, params = cls(), DqnParams()
         state = lab.init(params, np.random.default_rng(0))
         agent = agent_of(state.training, 0)
-        for options in (params.options, params.options._replace(double=True)):
+        for options in (params.options, params.options._replace(double_q_learning=True)):
             dqn.step(params.task.robot, options, agent, 40)
         lab.step(params, Inputs(), state)
         lab.fields(params, state)
         table_map()
-        compared()
+        baseline_costs()
         learning_task("ur5")
 
 
-DIVERGED = (
+DIVERGENCE_MESSAGE = (
     "Stopped where the weights of the network left all bounds, and kept those before: targets that "
     "move with the weights ran away with them. Lower the learning rate, keep fixed targets, or "
     "discount more; then reset."
 )
 
 
-def _steps(training: Training) -> int:
+def _step_count(training: Training) -> int:
     """Of each learner."""
     return int(training["last_steps"][0])
 

@@ -19,45 +19,45 @@ GAMMA, SWEEPS = 0.99, 400
 
 def best_controls(X: np.ndarray) -> np.ndarray:
     """Indices (k,) of the best controls from X (k, 2)."""
-    return np.asarray(np.argmin(_costs_ahead(X), axis=0))
+    return np.asarray(np.argmin(_q_values(X), axis=0))
 
 
 def least_costs(X: np.ndarray) -> np.ndarray:
     """V (k,) at X (k, 2)."""
-    return np.asarray(np.min(_costs_ahead(X), axis=0))
+    return np.asarray(np.min(_q_values(X), axis=0))
 
 
-def _costs_ahead(X: np.ndarray) -> np.ndarray:
+def _q_values(X: np.ndarray) -> np.ndarray:
     """Q (nu, k)."""
     task = learning_task("pendulum")
     return np.stack([
-        costs + GAMMA * _interpolate(_values(), *_coordinates(task, after))
-        for after, costs in _moves(task, X)
+        costs + GAMMA * _interpolate(_optimal_values(), *_coordinates(task, after))
+        for after, costs in _transitions(task, X)
     ])  # fmt: skip
 
 
-def _moves(task: RobotTask, X: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+def _transitions(task: RobotTask, X: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     """For every control where it leads from X (k, 2), and at what cost."""
     controls = range(task.robot.control_count)
     return [task.robot.step(X, np.full(len(X), u))[:2] for u in controls]
 
 
 @cache
-def _values() -> np.ndarray:
+def _optimal_values() -> np.ndarray:
     """V (ANGLES, VELOCITIES); angles all round."""
     task = learning_task("pendulum")
     angle = np.linspace(0.0, 2 * np.pi, ANGLES, endpoint=False)
-    velocity = np.linspace(-task.reach[1], task.reach[1], VELOCITIES)
+    velocity = np.linspace(-task.half_range[1], task.half_range[1], VELOCITIES)
     X = np.stack(np.meshgrid(angle, velocity, indexing="ij"), axis=-1).reshape(-1, 2)
-    moves = _moves(task, X)
+    moves = _transitions(task, X)
     places = [_coordinates(task, after) for after, _ in moves]
     costs = np.stack([costs for _, costs in moves])
-    return _iterate(costs, *(np.stack(parts) for parts in zip(*places, strict=True)))
+    return _value_iteration(costs, *(np.stack(parts) for parts in zip(*places, strict=True)))
 
 
 def _coordinates(task: RobotTask, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Of states (k, 2), in nodes of the table."""
-    velocity = (X[:, 1] / task.reach[1] + 1.0) * 0.5 * (VELOCITIES - 1)
+    velocity = (X[:, 1] / task.half_range[1] + 1.0) * 0.5 * (VELOCITIES - 1)
     return X[:, 0] % (2 * np.pi) / (2 * np.pi) * ANGLES, velocity
 
 
@@ -77,7 +77,7 @@ def _interpolate(V: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 @compiled
-def _iterate(costs: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _value_iteration(costs: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """V after all sweeps, from costs and coordinates of what follows (nu, nodes)."""
     V = np.zeros((ANGLES, VELOCITIES))
     for _ in range(SWEEPS):

@@ -119,13 +119,13 @@ class DqnParams(Params):
         """How it learns."""
         return DqnOptions(
             gamma=self.gamma,
-            rate=self.alpha,
-            batch=round(self.batch),
-            replays=self.replay,
+            learning_rate=self.alpha,
+            batch_size=round(self.batch),
+            experience_replay=self.replay,
             update_every=round(self.every),
             target_every=round(self.period) if self.targets == "copied" else 1,
             polyak=self.tau if self.targets == "polyak" else 0.0,
-            double=self.double,
+            double_q_learning=self.double,
             epsilon=self.epsilon,
             epsilon_end=self.epsilon_end,
             epsilon_steps=round(self.epsilon_steps),

@@ -9,9 +9,9 @@ from labs.arrays import Training
 from labs.plots import Curves, HeatMap, Line, Plot, Readout, TimeSeries, Trace
 from labs.reinforcement_learning.dqn.optimal_table import best_controls, least_costs
 from labs.reinforcement_learning.dqn.tasks import RobotTask, learning_task
-from labs.reinforcement_learning.dqn.training import UNKNOWN
+from labs.reinforcement_learning.dqn.training import UNKNOWN_COST
 
-ARROWS = 3
+ARROW_STRIDE = 3
 """Every so many nodes of a map has one."""
 AXES = ("{across}", "{up}")
 
@@ -73,7 +73,7 @@ def value_map(
 ) -> tuple[np.ndarray, np.ndarray]:
     """min Q in the task's units of cost and argmin Q, (NODES, NODES), rows along the second
     coordinate, through the state x (nx,)."""
-    q = q_values(sizes, w, task.robot.observe(_nodes(task, x)))
+    q = q_values(sizes, w, task.robot.observe(_map_states(task, x)))
     return _on_map(task, task.cost_scale * q.min(axis=1)), _on_map(task, q.argmin(axis=1))
 
 
@@ -81,55 +81,55 @@ def value_map(
 def table_map() -> tuple[np.ndarray, np.ndarray]:
     """The same of the pendulum's optimal table."""
     task = learning_task("pendulum")
-    X = task.nodes(task.base)
+    X = task.map_states(task.base)
     return _on_map(task, least_costs(X)), _on_map(task, best_controls(X))
 
 
-def _nodes(task: RobotTask, x: np.ndarray) -> np.ndarray:
+def _map_states(task: RobotTask, x: np.ndarray) -> np.ndarray:
     base = task.base.copy()
     base[4:] = x[4:] if task.name == "ur5" else base[4:]
-    return task.nodes(base)
+    return task.map_states(base)
 
 
 def _on_map(task: RobotTask, values: np.ndarray) -> np.ndarray:
-    return values.reshape(len(task.axis(1)), len(task.axis(0)))
+    return values.reshape(len(task.map_axis(1)), len(task.map_axis(0)))
 
 
-def maps(
+def map_fields(
     task: RobotTask, training: Training, s: int, shown: tuple[np.ndarray, np.ndarray]
 ) -> dict[str, np.ndarray]:
     """Values and policy `shown`, as `value_map` has them, and the buffer of learner s."""
     value, policy = shown
-    first, second = task.axis(0), task.axis(1)
-    some = (slice(ARROWS // 2, None, ARROWS),) * 2
+    first, second = task.map_axis(0), task.map_axis(1)
+    some = (slice(ARROW_STRIDE // 2, None, ARROW_STRIDE),) * 2
     across, up = np.meshgrid(first[some[0]], second[some[1]])
-    torque = task.torques[policy[some], 0].ravel() / task.largest
+    torque = task.torques[policy[some], 0].ravel() / task.max_torque
     arrows = np.stack([across.ravel(), up.ravel(), torque, np.zeros(torque.size)], axis=1)
     return {"x": first, "y": second, "value": value, "policy": arrows} | {
-        "held": _held(task, training, s)
+        "held": _buffer_histogram(task, training, s)
     }
 
 
-def _held(task: RobotTask, training: Training, s: int) -> np.ndarray:
+def _buffer_histogram(task: RobotTask, training: Training, s: int) -> np.ndarray:
     """How many states of the buffer are near each node."""
     known = min(int(training["stored"][s, 0]), training["observations"].shape[1])
-    at = task.seen(training["observations"][s, :known])
+    at = task.map_coordinates(training["observations"][s, :known])
     edges = []
     for i in (0, 1):
-        axis = task.axis(i)
+        axis = task.map_axis(i)
         half = 0.5 * (axis[1] - axis[0])
         edges.append(np.append(axis - half, axis[-1] + half))
     counts, _, _ = np.histogram2d(at[:, 1], at[:, 0], bins=(edges[1], edges[0]))
     return np.asarray(np.log10(1.0 + counts))
 
 
-def curves(
+def learning_curves(
     training: Training, s: int, compared: tuple[float, float] | None
 ) -> dict[str, np.ndarray]:
     """Of all learners, (k, S); loss and gradient of learner s; and what the controllers cost that
     they are compared with."""
     tried, online = training["tried"], training["online"].T
-    begun = (online != UNKNOWN).all(axis=1)
+    begun = (online != UNKNOWN_COST).all(axis=1)
     found = {
         "tried": tried,
         "greedy": training["greedy"].T,

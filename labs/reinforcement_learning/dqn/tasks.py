@@ -7,16 +7,16 @@ from functools import cache
 
 import numpy as np
 
-from labs.models.arms import Arm, load
-from labs.models.pendulums import hanging
+from labs.models.arms import Arm, load_arm
+from labs.models.pendulums import pendulum_arm
 from labs.shapes import BLUE, Vector3
-from labs.tasks.environments.reach import MOVING, RANGES, Reach, reach
+from labs.tasks.environments.reach import JOINT_RANGES, MOVING_JOINTS, Reach, reach
 from labs.tasks.environments.swing_up import SwingUp, swing_up
 
 TITLES = {"pendulum": "Pendulum", "double-pendulum": "Double pendulum", "ur5": "UR5, reaching"}
 NODES = 31
 """Along each side of a map."""
-TESTS = 12
+TEST_STARTS = 12
 """Starts from which a greedy policy is tried."""
 
 
@@ -36,16 +36,16 @@ class RobotTask:
     """The coordinates of x that a map runs over,"""
     middle: np.ndarray
     """(2,) about here, where the first is shown as 0"""
-    reach: np.ndarray
+    half_range: np.ndarray
     """(2,) and so far to either side."""
     base: np.ndarray
     """(nx,) the state whose other coordinates a map has."""
     axes: tuple[str, str]
     home: np.ndarray
     """(nx,) where the robot in the scene begins."""
-    seen: Callable[[np.ndarray], np.ndarray]
+    map_coordinates: Callable[[np.ndarray], np.ndarray]
     """Observations (k, o) to the two coordinates of the map (k, 2), from its middle."""
-    largest: float
+    max_torque: float
     """[N m] the torque that an arrow of the map shows in full: of the first motor."""
 
     @property
@@ -58,24 +58,24 @@ class RobotTask:
         """(nu, motors) [N m]"""
         return self.robot.torques
 
-    def tests(self) -> np.ndarray:
-        """(TESTS, nx) the same for all."""
-        return self.robot.starts(np.array([5, 6, 7, 8], np.uint64), TESTS)
+    def test_states(self) -> np.ndarray:
+        """(TEST_STARTS, nx) the same for all."""
+        return self.robot.initial_states(np.array([5, 6, 7, 8], np.uint64), TEST_STARTS)
 
-    def axis(self, i: int) -> np.ndarray:
+    def map_axis(self, i: int) -> np.ndarray:
         """(NODES,) of a map, from its middle."""
-        return np.linspace(-self.reach[i], self.reach[i], NODES)
+        return np.linspace(-self.half_range[i], self.half_range[i], NODES)
 
-    def nodes(self, base: np.ndarray) -> np.ndarray:
+    def map_states(self, base: np.ndarray) -> np.ndarray:
         """(NODES^2, nx) the states of a map through `base` (nx,): rows along the second
         coordinate."""
-        first, second = np.meshgrid(self.axis(0), self.axis(1))
+        first, second = np.meshgrid(self.map_axis(0), self.map_axis(1))
         X = np.tile(base, (NODES * NODES, 1))
         X[:, self.plane[0]] = self.middle[0] + first.ravel()
         X[:, self.plane[1]] = self.middle[1] + second.ravel()
         return X
 
-    def place(self, X: np.ndarray) -> np.ndarray:
+    def map_position(self, X: np.ndarray) -> np.ndarray:
         """(..., 2): where states (..., nx) are on the map; angles of pendulums within half a
         turn."""
         found = X[..., list(self.plane)] - self.middle
@@ -88,7 +88,7 @@ class RobotTask:
         if self.name != "ur5":
             return x[: self.arm.model.nq]
         q = self.arm.home.copy()
-        q[list(MOVING)] = x[:2]
+        q[list(MOVING_JOINTS)] = x[:2]
         return q
 
 
@@ -96,7 +96,7 @@ class RobotTask:
 def learning_task(name: str) -> RobotTask:
     """The one of this name, a key of TITLES."""
     if name == "ur5":
-        return _reaching()
+        return _reach_task()
     environment = swing_up(name)
     n = environment.mechanism.nq
     goal = np.concatenate([environment.goal, np.zeros(n)])
@@ -104,7 +104,7 @@ def learning_task(name: str) -> RobotTask:
     return RobotTask(
         name,
         environment,
-        hanging(n, (0.0, -0.8 * n), BLUE),
+        pendulum_arm(n, (0.0, -0.8 * n), BLUE),
         ((1.8 * n, 0.0, 0.55 + 0.7 * n), (0.0, 0.0, 0.14 + 0.55 * n)),
         ((0.1, 0.43 * n, 0.5 * n), 0.78 * n),
         10.0,
@@ -119,9 +119,9 @@ def learning_task(name: str) -> RobotTask:
     )
 
 
-def _reaching() -> RobotTask:
-    environment, arm = reach(), load("ur5")
-    middle = RANGES.mean(axis=1)
+def _reach_task() -> RobotTask:
+    environment, arm = reach(), load_arm("ur5")
+    middle = JOINT_RANGES.mean(axis=1)
     base = np.concatenate([middle, np.zeros(2), middle])
     return RobotTask(
         "ur5",
@@ -132,25 +132,25 @@ def _reaching() -> RobotTask:
         1.0,
         (0, 1),
         middle,
-        0.5 * (RANGES[:, 1] - RANGES[:, 0]),
+        0.5 * (JOINT_RANGES[:, 1] - JOINT_RANGES[:, 0]),
         base,
         ("shoulder [rad]", "elbow [rad]"),
-        np.concatenate([arm.home[list(MOVING)], np.zeros(2), arm.home[list(MOVING)]]),
+        np.concatenate([arm.home[list(MOVING_JOINTS)], np.zeros(2), arm.home[list(MOVING_JOINTS)]]),
         lambda seen: seen[:, :2] * np.pi,
         float(environment.torques[:, 0].max()),
     )
 
 
 @cache
-def _postures() -> tuple[np.ndarray, np.ndarray]:
+def _posture_grid() -> tuple[np.ndarray, np.ndarray]:
     """Postures of the reaching arm (k, 2), and the places of its tip (k, 3)."""
-    sides = (np.linspace(low, high, 61) for low, high in RANGES)
+    sides = (np.linspace(low, high, 61) for low, high in JOINT_RANGES)
     Q = np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2)
     return Q, reach().tips(Q)
 
 
 def posture_at(x: float, z: float) -> np.ndarray:
     """(2,) the posture within range whose tip is nearest to (x, z) [m]."""
-    Q, tips = _postures()
+    Q, tips = _posture_grid()
     q: np.ndarray = Q[np.argmin((tips[:, 0] - x) ** 2 + (tips[:, 2] - z) ** 2)]
     return q

@@ -6,16 +6,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labs.problems.finite_mdp import random_policy
-from labs.reinforcement_learning.dynamic_programming.side_by_side import RANDOM
+from labs.reinforcement_learning.dynamic_programming.iteration_comparison import RANDOM_CONTROL
 from labs.reinforcement_learning.dynamic_programming.tasks import TabularTask
 from labs.tasks.grid_world.cells import CellWorld
-from labs.tasks.grid_world.walk import GridWalk, advance_walk, choose_steps, is_on, start_walk
+from labs.tasks.grid_world.walk import (
+    GridWalk,
+    advance_walk,
+    choose_steps,
+    is_valid_walk,
+    start_walk,
+)
 from labs.tasks.pendulum_table.swing import (
     Swing,
     advance_swing,
-    coast,
+    advance_unpowered,
+    change_velocity,
     look_up_torques,
-    push,
     start_swing,
 )
 from labs.tasks.pendulum_table.table import PendulumGrid
@@ -24,14 +30,14 @@ PERIOD = 0.01
 """[s]"""
 MOVE, REST = 30, 100
 """Periods of a walker's step, and of a rest before it starts anew."""
-LONGEST = 120
+MAX_WALK_STEPS = 120
 """Steps after which a walker starts anew, or as many as there are states."""
-PUSH = 4.0
+PUSH_VELOCITY = 4.0
 """[rad/s] that a push gives the pendulum."""
 
 
 @dataclass(frozen=True, eq=False)
-class Follower:
+class PolicyFollower:
     """Where it is."""
 
     walk: GridWalk | Swing
@@ -42,14 +48,14 @@ class Follower:
     """Periods left until it starts anew."""
 
 
-def start_follower(task: TabularTask, draws: int = 0) -> Follower:
+def start_follower(task: TabularTask, draws: int = 0) -> PolicyFollower:
     """At the start."""
-    return Follower(_start(task), draws)
+    return PolicyFollower(_start(task), draws)
 
 
 def follow_policy(
-    task: TabularTask, follower: Follower, policy: np.ndarray | None, seed: int
-) -> Follower:
+    task: TabularTask, follower: PolicyFollower, policy: np.ndarray | None, seed: int
+) -> PolicyFollower:
     """One PERIOD [s] later. `policy` (X,) says what to do at the next decision; None: nothing is
     left to do."""
     if follower.resting == 1:
@@ -63,21 +69,21 @@ def follow_policy(
     return replace(follower, walk=_advance(task, follower.walk))
 
 
-def apply_push(task: TabularTask, follower: Follower, seed: int) -> Follower:
-    """The pendulum gets PUSH, a walker finds itself in some other cell."""
+def apply_push(task: TabularTask, follower: PolicyFollower, seed: int) -> PolicyFollower:
+    """The pendulum gets PUSH_VELOCITY, a walker finds itself in some other cell."""
     if isinstance(follower.walk, Swing):
-        return replace(follower, walk=push(follower.walk, PUSH))
+        return replace(follower, walk=change_velocity(follower.walk, PUSH_VELOCITY))
     assert isinstance(task.place, CellWorld)
     rng = np.random.default_rng((seed, follower.draws))
     x = int(rng.choice(np.flatnonzero(~task.mdp.terminal)))
-    return Follower(start_walk(task.place, MOVE, start=x), follower.draws + 1)
+    return PolicyFollower(start_walk(task.place, MOVE, start=x), follower.draws + 1)
 
 
-def carry_over(task: TabularTask, follower: Follower) -> Follower:
+def carry_over(task: TabularTask, follower: PolicyFollower) -> PolicyFollower:
     """The same on a task that has changed; at the start where its cells are no longer there."""
     place, walk = task.place, follower.walk
     if isinstance(place, CellWorld) and isinstance(walk, GridWalk):
-        fits = is_on(place, walk)
+        fits = is_valid_walk(place, walk)
     else:
         fits = isinstance(place, PendulumGrid) and isinstance(walk, Swing)
     return follower if fits else start_follower(task, follower.draws)
@@ -88,11 +94,13 @@ def _start(task: TabularTask) -> GridWalk | Swing:
 
 
 def _is_over(task: TabularTask, walk: GridWalk | Swing) -> bool:
-    lost = isinstance(walk, GridWalk) and walk.steps >= max(LONGEST, task.mdp.X)
+    lost = isinstance(walk, GridWalk) and walk.steps >= max(MAX_WALK_STEPS, task.mdp.X)
     return lost or bool(task.mdp.terminal[task.state(walk.at[0])])
 
 
-def _decide(task: TabularTask, follower: Follower, policy: np.ndarray, seed: int) -> Follower:
+def _decide(
+    task: TabularTask, follower: PolicyFollower, policy: np.ndarray, seed: int
+) -> PolicyFollower:
     walk, place, mdp = follower.walk, task.place, task.mdp
     if isinstance(walk, Swing):
         assert isinstance(place, PendulumGrid)
@@ -100,7 +108,7 @@ def _decide(task: TabularTask, follower: Follower, policy: np.ndarray, seed: int
     else:
         assert isinstance(place, CellWorld)
         rng = np.random.default_rng((seed, follower.draws))
-        if policy[0] == RANDOM:
+        if policy[0] == RANDOM_CONTROL:
             own = np.flatnonzero(random_policy(mdp)[task.state(walk.at[0])])
             policy = np.full(mdp.X, own[rng.integers(len(own))])
         walk = choose_steps(place, mdp, policy[None], walk, rng.random)
@@ -114,10 +122,10 @@ def _advance(task: TabularTask, walk: GridWalk | Swing) -> GridWalk | Swing:
     return advance_swing(task.place, walk, PERIOD)
 
 
-def _rest(task: TabularTask, follower: Follower, resting: int) -> Follower:
+def _rest(task: TabularTask, follower: PolicyFollower, resting: int) -> PolicyFollower:
     """For a period: a walker stands, the pendulum swings with its motor off."""
     walk = follower.walk
     if isinstance(walk, Swing):
         assert isinstance(task.place, PendulumGrid)
-        walk = coast(task.place, walk, PERIOD)
+        walk = advance_unpowered(task.place, walk, PERIOD)
     return replace(follower, walk=walk, resting=resting)

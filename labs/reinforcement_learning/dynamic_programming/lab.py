@@ -8,15 +8,26 @@ from typing import ClassVar
 import numpy as np
 
 from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
-from labs.number_texts import counted
+from labs.number_texts import count_text
 from labs.params import Value
 from labs.reinforcement_learning.dynamic_programming.follower import (
     PERIOD,
-    Follower,
+    PolicyFollower,
     apply_push,
     carry_over,
     follow_policy,
     start_follower,
+)
+from labs.reinforcement_learning.dynamic_programming.iteration_comparison import (
+    ITERATION_METHODS,
+    RANDOM_CONTROL,
+    Iterates,
+    IterationSettings,
+    convergence_curves,
+    iteration_report,
+    progress,
+    run_passes,
+    unpack_policy,
 )
 from labs.reinforcement_learning.dynamic_programming.params import DynamicProgrammingParams
 from labs.reinforcement_learning.dynamic_programming.plots import (
@@ -25,17 +36,6 @@ from labs.reinforcement_learning.dynamic_programming.plots import (
     horizon_curves,
     table_maps,
     table_sizes,
-)
-from labs.reinforcement_learning.dynamic_programming.side_by_side import (
-    ITERATION_METHODS,
-    RANDOM,
-    Iterates,
-    IterationSettings,
-    convergence_curves,
-    iteration_report,
-    passes,
-    progress,
-    unpack_policy,
 )
 from labs.reinforcement_learning.dynamic_programming.tasks import (
     TabularTask,
@@ -48,11 +48,11 @@ from labs.scene import Scene
 from labs.tasks.grid_world.cells import CellWorld
 from labs.tasks.grid_world.map import MAPS, GridWorld, grid_world
 from labs.tasks.grid_world.params import BOOK_WORLDS, edit_map
-from labs.tasks.grid_world.picture import draw_board, draw_walkers, draw_way, value_span
+from labs.tasks.grid_world.picture import draw_board, draw_path, draw_walkers, value_span
 from labs.tasks.grid_world.walk import GridWalk, nominal_path
-from labs.tasks.mdp_table.params import TABLES
+from labs.tasks.mdp_table.params import EXAMPLE_TABLES
 from labs.tasks.mdp_table.picture import draw_states
-from labs.tasks.mdp_table.world import UNNAMED, TableWorld, table_world
+from labs.tasks.mdp_table.world import NO_NAMES_NOTE, TableWorld, table_world
 from labs.tasks.pendulum_table.picture import draw_table
 from labs.tasks.pendulum_table.swing import Swing
 from labs.tasks.pendulum_table.table import PendulumGrid, table_size
@@ -70,7 +70,7 @@ class DynamicProgrammingState(State):
     spread: float
     """... and how they came about."""
     iterates: Iterates
-    follower: Follower
+    follower: PolicyFollower
 
     @property
     def tabular_task(self) -> TabularTask:
@@ -95,7 +95,7 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         "Cliff": {"map": MAPS["cliff"], "gamma": 1.0},
         "Windy": {"map": MAPS["windy"], "gamma": 1.0},
         **BOOK_WORLDS,
-        "Taxicab": {"world": "table", "table": TABLES["Taxicab"], "gamma": 0.9},
+        "Taxicab": {"world": "table", "table": EXAMPLE_TABLES["Taxicab"], "gamma": 0.9},
         "Little time left": {"shown": "finite", "gamma": 1.0, "to_go": 9},
         "Pendulum": {"world": "pendulum", "gamma": 0.98},
         "Coarse pendulum": {"world": "pendulum", "gamma": 0.98, "nodes": 21},
@@ -161,7 +161,9 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
             at, spent = cold_start(key, state.seed, params.spread), np.zeros(len(names))
             if params.warm and key != state.task:
                 at = warm_start(state.iterates, state.task, key, at)
-        later = passes(task.mdp, at, settings, task.limits) if not at.over else [(at, np.zeros(4))]
+        later = (
+            run_passes(task.mdp, at, settings, task.limits) if not at.over else [(at, np.zeros(4))]
+        )
         for i, (now, seconds) in enumerate(later, 1):
             spent = spent + seconds
             data = about | {"iterates": now, "seconds": dict(zip(names, spent, strict=True))}
@@ -218,7 +220,7 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         task = state.tabular_task
         stages, _ = finite_horizon(state.task, params.w_f)
         V, policy = _shown(params, state)
-        if policy is not None and policy[0] == RANDOM:
+        if policy is not None and policy[0] == RANDOM_CONTROL:
             policy = unpack_policy(task.mdp, policy)
         return {
             **convergence_curves(state.iterates, task.mdp.gamma, POINTS),
@@ -243,14 +245,16 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
     ) -> Mapping[str, str]:
         mdp = state.tabular_task.mdp
         place, (V, policy) = state.tabular_task.place, _shown(params, state)
-        about = mdp.report([state.tabular_task.start])
+        about = mdp.describe([state.tabular_task.start])
         if mdp.terminal.any() and not mdp.can_end.all():
-            about += f"\nFrom {counted(int((~mdp.can_end).sum()), 'state')} no way leads to a goal."
-        by_state = UNNAMED
+            about += (
+                f"\nFrom {count_text(int((~mdp.can_end).sum()), 'state')} no way leads to a goal."
+            )
+        by_state = NO_NAMES_NOTE
         if isinstance(place, CellWorld):
             about = "\n".join([about, *place.notes])
         if isinstance(place, TableWorld):
-            random = policy is None or policy[0] == RANDOM
+            random = policy is None or policy[0] == RANDOM_CONTROL
             by_state = place.describe(V, None if random else policy)
         report = iteration_report(state.iterates, state.seconds)
         return {"account": report, "about": about, "by_state": by_state}
@@ -275,7 +279,7 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
             assert isinstance(task.place, PendulumGrid)
             draw_table(scene, task.place, V, high, policy, walk)
             return
-        random = policy is not None and policy[0] == RANDOM
+        random = policy is not None and policy[0] == RANDOM_CONTROL
         if isinstance(task.place, TableWorld):
             draw_states(scene, task.place, V, (low, high), None if random else policy)
             draw_walkers(scene, task.place, walk)
@@ -284,10 +288,10 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         if policy is not None and random:
             policy = unpack_policy(task.mdp, policy)
         draw_board(scene, task.place, V, high, policy, low=low, relief=True)
-        draw_way(scene, task.place, nominal_path(task.place, task.solution[1]), 1)
+        draw_path(scene, task.place, nominal_path(task.place, task.solution[1]), 1)
         if finite:
             _, policies = finite_horizon(state.task, params.w_f)
-            draw_way(scene, task.place, nominal_path(task.place, policies[: int(params.to_go)]), 0)
+            draw_path(scene, task.place, nominal_path(task.place, policies[: int(params.to_go)]), 0)
         draw_walkers(scene, task.place, walk)
 
 

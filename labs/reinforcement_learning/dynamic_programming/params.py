@@ -1,7 +1,7 @@
 """What the user turns in dynamic programming: the world, the iterations, the horizon."""
 
 from labs.params import Group, Params
-from labs.reinforcement_learning.dynamic_programming.side_by_side import (
+from labs.reinforcement_learning.dynamic_programming.iteration_comparison import (
     ITERATION_METHODS,
     IterationSettings,
 )

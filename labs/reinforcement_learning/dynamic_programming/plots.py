@@ -3,7 +3,7 @@
 import numpy as np
 
 from labs.plots import Bars, Curves, HeatMap, Line, Note, Plot, Readout, TimeSeries, Trace
-from labs.reinforcement_learning.dynamic_programming.side_by_side import (
+from labs.reinforcement_learning.dynamic_programming.iteration_comparison import (
     ITERATION_METHODS,
 )
 from labs.reinforcement_learning.dynamic_programming.tasks import HORIZON, TabularTask

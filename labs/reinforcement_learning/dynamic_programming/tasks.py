@@ -14,8 +14,8 @@ import numpy as np
 from labs.algorithms import backward_recursion, policy_evaluation
 from labs.algorithms.policy_iteration import optimum
 from labs.problems.finite_mdp import FiniteMDP
-from labs.reinforcement_learning.dynamic_programming.side_by_side import (
-    RANDOM,
+from labs.reinforcement_learning.dynamic_programming.iteration_comparison import (
+    RANDOM_CONTROL,
     Iterates,
     initial_iterates,
     unpack_policy,
@@ -38,20 +38,27 @@ class TabularTask:
 
     @cached_property
     def initial_policy(self) -> np.ndarray:
-        """pi_0 (X,): RANDOM on a grid, the motor off on a pendulum."""
-        control = self.mdp.U // 2 if isinstance(self.place, PendulumGrid) else RANDOM
+        """pi_0 (X,): RANDOM_CONTROL on a grid, the motor off on a pendulum."""
+        control = self.mdp.U // 2 if isinstance(self.place, PendulumGrid) else RANDOM_CONTROL
         return np.full(self.mdp.X, control, np.int16)
 
     @cached_property
     def limits(self) -> np.ndarray:
         """(4, X): what each of ITERATION_METHODS goes to, V^(pi_0) and three times V*."""
         best, _ = self.solution
-        return np.stack([policy_evaluation.exact(self.mdp, self._first), best, best, best])
+        return np.stack(
+            [
+                policy_evaluation.exact_values(self.mdp, self._unpacked_initial_policy),
+                best,
+                best,
+                best,
+            ]
+        )
 
     @cached_property
     def solution(self) -> tuple[np.ndarray, np.ndarray]:
         """V* (X,) and an optimal policy (X,)."""
-        V, policy, _ = optimum(self.mdp, self._first)
+        V, policy, _ = optimum(self.mdp, self._unpacked_initial_policy)
         return V, policy
 
     @cached_property
@@ -77,7 +84,7 @@ class TabularTask:
         return int(self.place.state(at[:1], at[1:]))
 
     @property
-    def _first(self) -> np.ndarray:
+    def _unpacked_initial_policy(self) -> np.ndarray:
         """pi_0 as the algorithms take it."""
         return unpack_policy(self.mdp, self.initial_policy)
 
@@ -127,7 +134,7 @@ def finite_horizon(key: str, w_f: float) -> tuple[np.ndarray, np.ndarray]:
     """V (HORIZON + 1, X) and policies (HORIZON, X) by the steps to go, with the final cost w_f
     times the straight distance to the goal."""
     task = tabular_task(key)
-    return backward_recursion.tables(task.mdp, w_f * task.distance, HORIZON)
+    return backward_recursion.value_and_policy_tables(task.mdp, w_f * task.distance, HORIZON)
 
 
 def cold_start(key: str, seed: int, spread: float) -> Iterates:

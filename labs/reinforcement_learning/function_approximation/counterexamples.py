@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labs.algorithms.features import Features, from_matrix
+from labs.algorithms.features import Features, features_from_matrix
 from labs.problems.finite_mdp import FiniteMDP
 from labs.problems.prediction import PredictionTask, prediction_task
 
@@ -46,7 +46,7 @@ def baird(horizon: int = 1000, gamma: float = 0.99, off_policy: bool = True) -> 
     phi[:6, :6] = 2.0 * np.eye(6)
     phi[:6, 7] = 1.0
     phi[6, 6:] = 1.0, 2.0
-    return Counterexample(task, from_matrix(phi), np.array([1.0] * 6 + [10.0, 1.0]), mdp)
+    return Counterexample(task, features_from_matrix(phi), np.array([1.0] * 6 + [10.0, 1.0]), mdp)
 
 
 def two_states(
@@ -57,4 +57,6 @@ def two_states(
     P = np.array([[[0.0, 1.0, 0.0], [0.0, 1.0 - epsilon, epsilon], [0.0, 0.0, 1.0]]])
     mdp = FiniteMDP(np.zeros((3, 1)), gamma, np.arange(3) == 2, P=P)
     task = prediction_task(mdp, np.zeros(3, int), np.zeros(3), starts, horizon)
-    return Counterexample(task, from_matrix(np.array([[1.0], [2.0], [0.0]])), np.ones(1), mdp)
+    return Counterexample(
+        task, features_from_matrix(np.array([[1.0], [2.0], [0.0]])), np.ones(1), mdp
+    )

@@ -10,15 +10,15 @@ import numpy as np
 
 from labs.algorithms.features import (
     Features,
-    aggregation,
-    fourier,
-    from_matrix,
+    features_from_matrix,
+    fourier_basis,
     grid_centers,
-    polynomials,
-    radial,
-    table,
-    tiles,
-    vanishing,
+    polynomial_basis,
+    radial_basis,
+    state_aggregation,
+    tabular_features,
+    tile_coding,
+    zero_features_at,
 )
 from labs.tasks.pendulum_table.table import PendulumGrid
 
@@ -44,25 +44,25 @@ def line_features(kind: str, n: int, states: int) -> Features:
     # The ends look like their neighbours, times 0.
     place = np.clip(np.arange(-1, states + 1), 0, states - 1)
     wider = inner._replace(active=inner.active[place], value=inner.value[place])
-    return vanishing(wider, np.isin(np.arange(states + 2), (0, states + 1)))
+    return zero_features_at(wider, np.isin(np.arange(states + 2), (0, states + 1)))
 
 
 def _line_features(kind: str, n: int, states: int) -> Features:
     points = np.linspace(0.0, 1.0, states)[:, None]
     match kind:
         case "table":
-            return table(states)
+            return tabular_features(states)
         case "aggregation":
-            return aggregation(np.arange(states) * n // states)
+            return state_aggregation(np.arange(states) * n // states)
         case "polynomial":
-            return polynomials(points, n)
+            return polynomial_basis(points, n)
         case "fourier":
-            return fourier(points, n)
+            return fourier_basis(points, n)
         case "radial":
             centers = grid_centers(n, 1) if n > 1 else np.array([[0.5]])
-            return radial(points, centers, WIDTH / max(n - 1, 1), normalized=True)
+            return radial_basis(points, centers, WIDTH / max(n - 1, 1), normalized=True)
         case _:
-            return tiles(points, LINE_TILINGS, np.array([n]))
+            return tile_coding(points, LINE_TILINGS, np.array([n]))
 
 
 @lru_cache(maxsize=8)
@@ -75,13 +75,13 @@ def plane_features(kind: str, n: int, grid: PendulumGrid) -> Features:
     points = np.stack([turn, speed], axis=1)
     match kind:
         case "table":
-            return table(grid.X)
+            return tabular_features(grid.X)
         case "aggregation":
             across = np.repeat(np.arange(grid.q_nodes) * n // grid.q_nodes, grid.v_nodes)
             up = np.tile(np.arange(grid.v_nodes) * n // grid.v_nodes, grid.q_nodes)
-            return aggregation(across * n + up)
+            return state_aggregation(across * n + up)
         case "polynomial":
-            return polynomials(points, n)
+            return polynomial_basis(points, n)
         case "fourier":
             k = np.arange(n + 1)
             around = np.hstack([np.cos(np.outer(angle, k)), np.sin(np.outer(angle, k[1:]))])
@@ -94,9 +94,9 @@ def plane_features(kind: str, n: int, grid: PendulumGrid) -> Features:
             around, along = (part / part.sum(axis=1, keepdims=True) for part in (around, along))
             return _products(around, along)
         case _:
-            return tiles(points, PLANE_TILINGS, np.array([n, n]))
+            return tile_coding(points, PLANE_TILINGS, np.array([n, n]))
 
 
 def _products(a: np.ndarray, b: np.ndarray) -> Features:
     """Every feature of a (X, k) times every one of b (X, l)."""
-    return from_matrix((a[:, :, None] * b[:, None, :]).reshape(len(a), -1))
+    return features_from_matrix((a[:, :, None] * b[:, None, :]).reshape(len(a), -1))

@@ -8,39 +8,39 @@ from labs.arrays import Training
 from labs.reinforcement_learning.function_approximation import prediction, swing_up
 from labs.reinforcement_learning.function_approximation.given_policy import (
     GAMMA,
-    PENDULUM,
-    grid_of,
+    PENDULUM_GRID,
+    on_map,
 )
+from labs.reinforcement_learning.function_approximation.learning_world import Fields
 from labs.reinforcement_learning.function_approximation.line_picture import draw_line
 from labs.reinforcement_learning.function_approximation.motion import (
     PolicyMotion,
-    hop,
-    swing_by,
-    swing_until_caught,
+    advance_pendulum,
+    advance_pendulum_to_goal,
+    advance_walker,
 )
 from labs.reinforcement_learning.function_approximation.params import (
     SHOWN_FEATURES,
     ApproximationParams,
 )
-from labs.reinforcement_learning.function_approximation.plots import over_all, spread
+from labs.reinforcement_learning.function_approximation.plots import band_fields, reference_lines
 from labs.reinforcement_learning.function_approximation.prediction import given_policy
-from labs.reinforcement_learning.function_approximation.subject import Fields
 from labs.reinforcement_learning.function_approximation.swing_up import (
-    HANGING,
+    HANGING_STATE,
     features_of,
     swing_task,
 )
 from labs.resumable import Resumable
 from labs.scene import Scene
-from labs.tasks.pendulum_table.picture import draw_table, draw_wires
+from labs.tasks.pendulum_table.picture import draw_table, draw_wireframe
 from labs.tasks.pendulum_table.policy_arrows import torque_arrows
 
 
-class Predicted:
+class PolicyPrediction:
     """The value of a given policy."""
 
-    def begin(self, params: ApproximationParams, rng: np.random.Generator) -> Training:
-        return prediction.begin(params, rng)
+    def initial_training(self, params: ApproximationParams, rng: np.random.Generator) -> Training:
+        return prediction.initial_training(params, rng)
 
     def learn(self, params: ApproximationParams, training: Training) -> Resumable[Training]:
         return prediction.learn(params, training)
@@ -61,9 +61,9 @@ class Predicted:
 
     def fields(self, params: ApproximationParams, training: Training) -> Fields:
         given = given_policy(params)
-        found = {"steps": training["steps"]} | spread("error", training["error"])
+        found = {"steps": training["steps"]} | band_fields("error", training["error"])
         best, fixed = given.best_error, given.fixed_error
-        found |= over_all(training, reference_best=best, reference_fixed=fixed)
+        found |= reference_lines(training, reference_best=best, reference_fixed=fixed)
         if params.data != "latest":
             known = training["squares"].size and len(training["steps"]) > 1
             ends = training["steps"][[0, -1]] if known else np.zeros(0)
@@ -71,7 +71,7 @@ class Predicted:
             found |= {"squares_x": ends, "squares": np.full(len(ends), level)}
         v = given.values(training["w"][params.shown])
         if params.world == "surface":
-            return found | _maps(params, given.features, v, given.task.truth)
+            return found | _map_fields(params, given.features, v, given.task.truth)
         inside = ~given.mdp.terminal
         named = {"truth": given.task.truth, "estimate": v}
         named |= {"best": given.values(given.best), "fixed": given.values(given.fixed)}
@@ -87,9 +87,9 @@ class Predicted:
     ) -> PolicyMotion:
         given = given_policy(params)
         if params.world == "walk":
-            return hop(given.task, motion)
+            return advance_walker(given.task, motion)
         starts = given.task.task.starts
-        return swing_until_caught(PENDULUM, given.mdp, given.policy, starts, motion)
+        return advance_pendulum_to_goal(PENDULUM_GRID, given.mdp, given.policy, starts, motion)
 
     def draw(
         self, scene: Scene, params: ApproximationParams, training: Training, motion: PolicyMotion
@@ -108,8 +108,8 @@ class Predicted:
 class SwingUpLearner:
     """The pendulum that learns to swing up."""
 
-    def begin(self, params: ApproximationParams, rng: np.random.Generator) -> Training:
-        return swing_up.begin(params, rng)
+    def initial_training(self, params: ApproximationParams, rng: np.random.Generator) -> Training:
+        return swing_up.initial_training(params, rng)
 
     def learn(self, params: ApproximationParams, training: Training) -> Resumable[Training]:
         return swing_up.learn(params, training)
@@ -117,7 +117,7 @@ class SwingUpLearner:
     def measure(self, params: ApproximationParams, training: Training) -> dict[str, float]:
         measured = {
             "size": float(training["w"][0].size),
-            "greedy_best": float(swing_task()[2][HANGING].min()),
+            "greedy_best": float(swing_task()[2][HANGING_STATE].min()),
         }
         if training["steps"].size:
             measured["greedy_now"] = float(np.median(training["greedy"][:, -1]))
@@ -126,11 +126,11 @@ class SwingUpLearner:
     def fields(self, params: ApproximationParams, training: Training) -> Fields:
         _, _, q_star = swing_task()
         q = q_table(features_of(params), training["w"][params.shown])
-        found = {"steps": training["steps"]} | spread("greedy", training["greedy"], "median")
-        found |= over_all(training, optimum=float(q_star[HANGING].min()))
-        found |= _maps(params, features_of(params), q.min(axis=1), q_star.min(axis=1))
-        everywhere = np.ones(PENDULUM.X, bool)
-        return found | {"policy": torque_arrows(PENDULUM, q.argmin(axis=1), everywhere)}
+        found = {"steps": training["steps"]} | band_fields("greedy", training["greedy"], "median")
+        found |= reference_lines(training, optimum=float(q_star[HANGING_STATE].min()))
+        found |= _map_fields(params, features_of(params), q.min(axis=1), q_star.min(axis=1))
+        everywhere = np.ones(PENDULUM_GRID.X, bool)
+        return found | {"policy": torque_arrows(PENDULUM_GRID, q.argmin(axis=1), everywhere)}
 
     def move(
         self, params: ApproximationParams, training: Training, motion: PolicyMotion
@@ -139,7 +139,7 @@ class SwingUpLearner:
             q = q_table(features_of(params), training["w"][params.shown])
             return np.asarray(q.argmin(axis=1))
 
-        return swing_by(PENDULUM, swing_task()[0], greedy, motion)
+        return advance_pendulum(PENDULUM_GRID, swing_task()[0], greedy, motion)
 
     def draw(
         self, scene: Scene, params: ApproximationParams, training: Training, motion: PolicyMotion
@@ -158,22 +158,22 @@ def _some_features(features: Features) -> np.ndarray:
     return features.dense[:, ::every][:, :SHOWN_FEATURES]
 
 
-def _feature(params: ApproximationParams, features: Features) -> np.ndarray:
+def _shown_feature(params: ApproximationParams, features: Features) -> np.ndarray:
     """(X,) the one to look at; the last where there are fewer."""
     i = min(round(params.feature), features.size) - 1
     return np.asarray(np.where(features.active == i, features.value, 0.0).sum(axis=1))
 
 
-def _maps(
+def _map_fields(
     params: ApproximationParams, features: Features, v: np.ndarray, truth: np.ndarray
 ) -> Fields:
     return {
-        "angle": PENDULUM.angles,
-        "velocity": PENDULUM.velocities,
-        "estimate_map": grid_of(v),
-        "truth_map": grid_of(truth),
-        "error_map": grid_of(v - truth),
-        "feature_map": grid_of(_feature(params, features)),
+        "angle": PENDULUM_GRID.angles,
+        "velocity": PENDULUM_GRID.velocities,
+        "estimate_map": on_map(v),
+        "truth_map": on_map(truth),
+        "error_map": on_map(v - truth),
+        "feature_map": on_map(_shown_feature(params, features)),
     }
 
 
@@ -187,9 +187,9 @@ def _draw_relief(
     motion: PolicyMotion,
 ) -> None:
     high = float(truth.max())
-    phi = _feature(params, features)
+    phi = _shown_feature(params, features)
     relief = {"estimate": v, "truth": truth, "feature": high * phi / max(np.abs(phi).max(), 1e-9)}
     shown = relief[params.look]
-    draw_table(scene, PENDULUM, shown, high, policy, motion.swing)
+    draw_table(scene, PENDULUM_GRID, shown, high, policy, motion.swing)
     if params.look == "estimate":
-        draw_wires(scene, PENDULUM, truth, high)
+        draw_wireframe(scene, PENDULUM_GRID, truth, high)

@@ -10,8 +10,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from labs.algorithms import policy_iteration
-from labs.algorithms.approximation import best_fit, mean_update, td_fixed_point
-from labs.algorithms.features import Features, values, vanishing
+from labs.algorithms.approximation import expected_td_update, td_fixed_point, weighted_least_squares
+from labs.algorithms.features import Features, state_values, zero_features_at
 from labs.problems.finite_mdp import FiniteMDP, random_policy
 from labs.problems.prediction import PredictionTask, prediction_task, root_mean_square_error
 from labs.reinforcement_learning.function_approximation.feature_sets import (
@@ -19,15 +19,20 @@ from labs.reinforcement_learning.function_approximation.feature_sets import (
     plane_features,
 )
 from labs.tasks.pendulum_table.table import PendulumGrid, pendulum_grid
-from labs.tasks.random_walk.walks import THOUSAND, visit_share, walk_mdp, walk_task
+from labs.tasks.random_walk.walks import (
+    THOUSAND_STATE_WALK,
+    on_policy_distribution,
+    walk_mdp,
+    walk_task,
+)
 
-PENDULUM = pendulum_grid(rods=1, q_nodes=41, v_nodes=31, levels=5)
+PENDULUM_GRID = pendulum_grid(rods=1, q_nodes=41, v_nodes=31, levels=5)
 """1271 states, 5 torques, 0.1 s a step."""
 GAMMA = 0.95
 """Of the pendulum's costs."""
 HORIZON = 200
 """Steps: beyond what the pendulum takes from any start."""
-CAUGHT = (0.2, 0.6)
+GOAL_TOLERANCE = (0.2, 0.6)
 """[rad], [rad/s] from upright at rest within which it is caught."""
 
 
@@ -60,32 +65,34 @@ class GivenPolicy:
 
     def values(self, w: np.ndarray) -> np.ndarray:
         """v (X,)."""
-        return values(self.features, w)
+        return state_values(self.features, w)
 
 
 @lru_cache(maxsize=8)
-def walk(kind: str, n: int) -> GivenPolicy:
+def walk_policy(kind: str, n: int) -> GivenPolicy:
     """The even policy on the 1000 states."""
-    task = walk_task(THOUSAND)._replace(weight=visit_share(THOUSAND))
-    mdp = walk_mdp(THOUSAND)
-    features = line_features(kind, n, THOUSAND.states)
-    return _solved(task, features, mdp, random_policy(mdp), kind)
+    task = walk_task(THOUSAND_STATE_WALK)._replace(
+        weight=on_policy_distribution(THOUSAND_STATE_WALK)
+    )
+    mdp = walk_mdp(THOUSAND_STATE_WALK)
+    features = line_features(kind, n, THOUSAND_STATE_WALK.states)
+    return _solve_given_policy(task, features, mdp, random_policy(mdp), kind)
 
 
 @lru_cache(maxsize=8)
-def surface(kind: str, m: int) -> GivenPolicy:
+def pendulum_policy(kind: str, m: int) -> GivenPolicy:
     """The optimal policy of the pendulum."""
-    task, mdp, policy = caught_pendulum()
-    features = vanishing(plane_features(kind, m, PENDULUM), mdp.terminal)
-    return _solved(task, features, mdp, policy, kind)
+    task, mdp, policy = pendulum_prediction_task()
+    features = zero_features_at(plane_features(kind, m, PENDULUM_GRID), mdp.terminal)
+    return _solve_given_policy(task, features, mdp, policy, kind)
 
 
 @lru_cache(maxsize=1)
-def caught_pendulum() -> tuple[PredictionTask, FiniteMDP, np.ndarray]:
+def pendulum_prediction_task() -> tuple[PredictionTask, FiniteMDP, np.ndarray]:
     """The task, its model, and the policy (X,) int64."""
-    grid, free = PENDULUM, PENDULUM.mdp(GAMMA)
+    grid, free = PENDULUM_GRID, PENDULUM_GRID.mdp(GAMMA)
     away = np.abs(grid.nodes - np.array([np.pi, 0.0]))
-    ended = (away < np.array(CAUGHT)).all(axis=1)
+    ended = (away < np.array(GOAL_TOLERANCE)).all(axis=1)
     cost = np.where(ended[:, None], 0.0, free.C)
     stays = np.where(ended[:, None], np.arange(grid.X)[:, None], free.successors)
     mdp = FiniteMDP(cost, GAMMA, ended, successor=stays.astype(np.int32))
@@ -111,7 +118,7 @@ def _visits(mdp: FiniteMDP, policy: np.ndarray) -> tuple[list[int], np.ndarray]:
     return starts.tolist(), visits
 
 
-def _solved(
+def _solve_given_policy(
     task: PredictionTask, features: Features, mdp: FiniteMDP, policy: np.ndarray, kind: str
 ) -> GivenPolicy:
     mu = task.weight
@@ -122,11 +129,11 @@ def _solved(
         best[features.active[live, 0]] = task.truth[live]
         return GivenPolicy(task, features, mdp, policy, best, best)
     P, C, phi = mdp.transition_matrix(policy), mdp.policy_cost(policy), features.dense
-    best = best_fit(task.truth, phi, mu)
-    fixed = td_fixed_point(*mean_update(P, C, float(mdp.gamma), phi, mu))
+    best = weighted_least_squares(task.truth, phi, mu)
+    fixed = td_fixed_point(*expected_td_update(P, C, float(mdp.gamma), phi, mu))
     return GivenPolicy(task, features, mdp, policy, best, fixed)
 
 
-def grid_of(values: np.ndarray, grid: PendulumGrid = PENDULUM) -> np.ndarray:
+def on_map(values: np.ndarray, grid: PendulumGrid = PENDULUM_GRID) -> np.ndarray:
     """Values (X,) as a map (velocities, angles)."""
     return values.reshape(grid.shape).T

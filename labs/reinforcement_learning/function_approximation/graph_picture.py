@@ -7,7 +7,7 @@ import numpy as np
 from labs.reinforcement_learning.function_approximation import spiral
 from labs.scene import Color, Scene
 
-TALL = 0.28
+DECADE_HEIGHT = 0.28
 """[m] for a tenfold value."""
 RING, DEEP = 1.25, 0.75
 """[m] half axes of the ring of states on the floor."""
@@ -19,9 +19,9 @@ REACH = 20.0
 """The values of the spiral that are in view."""
 
 
-def height(value: float) -> float:
-    """[m]: linear about 0, then a tenfold value is TALL more."""
-    return float(TALL * np.arcsinh(value) / np.log(10.0))
+def value_height(value: float) -> float:
+    """[m]: linear about 0, then a tenfold value is DECADE_HEIGHT more."""
+    return float(DECADE_HEIGHT * np.arcsinh(value) / np.log(10.0))
 
 
 def draw_states(
@@ -34,7 +34,7 @@ def draw_states(
 ) -> None:
     """`values` (X,) at `places` (X, 2) [m], the walker at a state, labels, arrows."""
     feet = np.column_stack([places, np.zeros(len(places))])
-    tops = np.column_stack([places, [height(float(value)) for value in values]])
+    tops = np.column_stack([places, [value_height(float(value)) for value in values]])
     names = feet + np.array([0.0, -0.2, -0.08])
     corners = np.array([*feet, *tops, *names, feet.mean(axis=0) + LOWEST])
     around = np.concatenate([corners - ROOM, corners + ROOM])
@@ -70,19 +70,19 @@ def draw_spiral(scene: Scene, ways: np.ndarray) -> None:
     scene.camera((0.0, -2.6, 2.6), (0.0, 0.0, 0.0))
     now = float(ways[-1])
     w = np.linspace(now - 60.0, now + 12.0, 900)
-    near = w[np.linalg.norm(spiral.curve(w), axis=1) < 14.0 * REACH]
-    scene.trail("curve", _on_floor(near), "muted")
+    near = w[np.linalg.norm(spiral.spiral_values(w), axis=1) < 14.0 * REACH]
+    scene.trail("curve", _floor_points(near), "muted")
     scene.sphere("truth", (0.0, 0.0, 0.0), 0.04, "reference")
     scene.label("truth here", "the truth, 0", (0.0, 0.0, 0.13))
     fine = np.interp(np.linspace(0.0, len(ways) - 1.0, 400), np.arange(len(ways)), ways)
     if len(ways) > 1:
-        scene.trail("way", _on_floor(fine) + np.array([0.0, 0.0, 0.01]), "actual")
-    scene.sphere("estimate", _on_floor(np.array([now]))[0], 0.05, "actual")
+        scene.trail("way", _floor_points(fine) + np.array([0.0, 0.0, 0.01]), "actual")
+    scene.sphere("estimate", _floor_points(np.array([now]))[0], 0.05, "actual")
 
 
-def _on_floor(w: np.ndarray) -> np.ndarray:
+def _floor_points(w: np.ndarray) -> np.ndarray:
     """(k, 3) [m], compressed."""
-    values = spiral.curve(w)
+    values = spiral.spiral_values(w)
     across, up = spiral.in_plane(values)
     size = np.hypot(across, up)
     scale = np.where(size > 0.0, 0.35 * np.log1p(size / 4.0) / np.maximum(size, 1e-12), 0.0)

@@ -9,29 +9,37 @@ import numpy as np
 from labs.arrays import Training
 from labs.lab import Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
-from labs.random_numbers import seeded
-from labs.reinforcement_learning.function_approximation.example_worlds import Nine, Spiral, Triad
+from labs.random_numbers import random_states
+from labs.reinforcement_learning.function_approximation.example_worlds import (
+    ConvergenceTable,
+    Spiral,
+    Triad,
+)
 from labs.reinforcement_learning.function_approximation.fitted_worlds import (
-    Predicted,
+    PolicyPrediction,
     SwingUpLearner,
 )
-from labs.reinforcement_learning.function_approximation.motion import PERIOD, PolicyMotion, at_rest
+from labs.reinforcement_learning.function_approximation.learning_world import LearningWorld
+from labs.reinforcement_learning.function_approximation.motion import (
+    PERIOD,
+    PolicyMotion,
+    initial_motion,
+)
 from labs.reinforcement_learning.function_approximation.params import (
     ITERATIONS,
     ApproximationParams,
 )
 from labs.reinforcement_learning.function_approximation.plots import PLOTS
-from labs.reinforcement_learning.function_approximation.subject import Subject
 from labs.scene import Scene
 
-SUBJECTS: Mapping[str, Subject] = {
-    "walk": Predicted(),
-    "surface": Predicted(),
+LEARNING_WORLDS: Mapping[str, LearningWorld] = {
+    "walk": PolicyPrediction(),
+    "surface": PolicyPrediction(),
     "swing": SwingUpLearner(),
     "star": Triad(),
     "pair": Triad(),
     "spiral": Spiral(),
-    "nine": Nine(),
+    "nine": ConvergenceTable(),
 }
 
 
@@ -78,8 +86,10 @@ class FunctionApproximation(Lab[ApproximationParams, ApproximationState]):
     }
 
     def init(self, params: ApproximationParams, rng: np.random.Generator) -> ApproximationState:
-        training = SUBJECTS[params.world].begin(params, rng)
-        return ApproximationState(training=training, motion=at_rest(seeded(rng, 1)[0]))
+        training = LEARNING_WORLDS[params.world].initial_training(params, rng)
+        return ApproximationState(
+            training=training, motion=initial_motion(random_states(rng, 1)[0])
+        )
 
     def step(
         self, params: ApproximationParams, inputs: Inputs, state: ApproximationState
@@ -87,44 +97,48 @@ class FunctionApproximation(Lab[ApproximationParams, ApproximationState]):
         """10 ms of what moves in the scene; it goes on whatever becomes of the weights."""
         if state.trouble:
             return state
-        motion = SUBJECTS[params.world].move(params, state.training, state.motion)
+        motion = LEARNING_WORLDS[params.world].move(params, state.training, state.motion)
         return replace(state, t=state.t + self.period, motion=motion)
 
     def solve(
         self, params: ApproximationParams, state: ApproximationState
     ) -> Iterator[Snapshot | None]:
         """A hundredth of the learning an iteration; goes on from the present weights."""
-        subject, training, done, i = SUBJECTS[params.world], state.training, "", 0
-        last = 1 if _unit(params) == "solutions" else ITERATIONS
+        subject, training, done, i = LEARNING_WORLDS[params.world], state.training, "", 0
+        last = 1 if _progress_unit(params) == "solutions" else ITERATIONS
         while not done:
             training, i = (yield from subject.learn(params, training)), i + 1
             if not training["sound"]:
                 done = "The weights left all bounds."
             elif i == last:
-                done = _done(params, training)
+                done = _done_message(params, training)
             yield Snapshot(i, training, done, i / last)
 
     def accept(
         self, params: ApproximationParams, state: ApproximationState, snapshot: Snapshot
     ) -> ApproximationState:
         training = snapshot.data
-        return replace(state, training=training, trouble="" if training["sound"] else _why(params))
+        return replace(
+            state,
+            training=training,
+            trouble="" if training["sound"] else _divergence_message(params),
+        )
 
     def measure(self, params: ApproximationParams, state: ApproximationState) -> Measurement:
         steps = state.training["steps"]
         learned = {"learned": float(steps[-1])} if steps.size else {}
-        return learned | SUBJECTS[params.world].measure(params, state.training)
+        return learned | LEARNING_WORLDS[params.world].measure(params, state.training)
 
     def fields(
         self, params: ApproximationParams, state: ApproximationState
     ) -> Mapping[str, np.ndarray]:
-        return SUBJECTS[params.world].fields(params, state.training)
+        return LEARNING_WORLDS[params.world].fields(params, state.training)
 
     def labels(self, params: ApproximationParams) -> Mapping[str, str | tuple[str, ...]]:
-        return {"unit": _unit(params)}
+        return {"unit": _progress_unit(params)}
 
     def draw(self, scene: Scene, params: ApproximationParams, state: ApproximationState) -> None:
-        SUBJECTS[params.world].draw(scene, params, state.training, state.motion)
+        LEARNING_WORLDS[params.world].draw(scene, params, state.training, state.motion)
 
     @classmethod
     def prepare(cls) -> None:
@@ -137,7 +151,7 @@ class FunctionApproximation(Lab[ApproximationParams, ApproximationState]):
             lab.step(params, Inputs(), lab.accept(params, state, found))
 
 
-def _unit(params: ApproximationParams) -> str:
+def _progress_unit(params: ApproximationParams) -> str:
     """What learning is counted in."""
     if params.world in ("star", "pair", "spiral"):
         return "updates"
@@ -148,13 +162,13 @@ def _unit(params: ApproximationParams) -> str:
     return "fits" if params.world == "swing" else "solutions"
 
 
-def _done(params: ApproximationParams, training: Training) -> str:
-    if _unit(params) == "solutions":
+def _done_message(params: ApproximationParams, training: Training) -> str:
+    if _progress_unit(params) == "solutions":
         return "The weights of least squares are found."
-    return f"{training['steps'][-1]:.0f} {_unit(params)} of learning done."
+    return f"{training['steps'][-1]:.0f} {_progress_unit(params)} of learning done."
 
 
-def _why(params: ApproximationParams) -> str:
+def _divergence_message(params: ApproximationParams) -> str:
     """What diverged, and what to do."""
     if params.world in ("star", "pair"):
         return (

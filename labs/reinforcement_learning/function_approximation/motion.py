@@ -7,15 +7,15 @@ import numpy as np
 
 from labs.problems.finite_mdp import FiniteMDP
 from labs.problems.prediction import PredictionTask, sample_step
-from labs.random_numbers import below
+from labs.random_numbers import random_integer
 from labs.tasks.pendulum_table.swing import Swing, advance_swing, look_up_torques, start_swing
 from labs.tasks.pendulum_table.table import PendulumGrid
 
 PERIOD = 0.01
 """[s]"""
-HOP = 20
+WALKER_PERIODS = 20
 """Periods of a walker's step."""
-LONGEST, REST = 80, 10
+MAX_DECISIONS, REST = 80, 10
 """Decisions after which a pendulum starts anew; that it stays where it was caught."""
 
 
@@ -33,36 +33,36 @@ class PolicyMotion:
     """Periods since the walker's last step."""
 
 
-def at_rest(random: np.ndarray) -> PolicyMotion:
+def initial_motion(random: np.ndarray) -> PolicyMotion:
     """Before anything moves."""
     return PolicyMotion(-1, start_swing(), random)
 
 
-def hop(task: PredictionTask, motion: PolicyMotion) -> PolicyMotion:
+def advance_walker(task: PredictionTask, motion: PolicyMotion) -> PolicyMotion:
     """A period later: a step of the policy that is followed, every now and then."""
-    if motion.place >= 0 and motion.clock + 1 < HOP:
+    if motion.place >= 0 and motion.clock + 1 < WALKER_PERIODS:
         return replace(motion, clock=motion.clock + 1)
     random, here = motion.random.copy(), motion.place
     if here < 0 or task.task.terminal[here]:
         starts = task.task.starts
-        place = int(starts[below(random, len(starts))])
+        place = int(starts[random_integer(random, len(starts))])
     else:
         _, place = sample_step(task, here, random)
     return replace(motion, place=place, random=random, clock=0)
 
 
-def swing_by(
+def advance_pendulum(
     grid: PendulumGrid, mdp: FiniteMDP, policy: Callable[[], np.ndarray], motion: PolicyMotion
 ) -> PolicyMotion:
     """A period later, from hanging at rest, torques by a policy (X,) that is asked for when due."""
     swing = motion.swing
     if swing.clock == 0:
-        swing = start_swing() if swing.steps >= LONGEST else swing
+        swing = start_swing() if swing.steps >= MAX_DECISIONS else swing
         swing = look_up_torques(grid, mdp, policy()[None], swing)
     return replace(motion, swing=advance_swing(grid, swing, PERIOD))
 
 
-def swing_until_caught(
+def advance_pendulum_to_goal(
     grid: PendulumGrid, mdp: FiniteMDP, policy: np.ndarray, starts: np.ndarray, motion: PolicyMotion
 ) -> PolicyMotion:
     """The same from any of `starts` until a terminal state, where it is held for a while."""
@@ -71,9 +71,9 @@ def swing_until_caught(
         node = int(grid.state(swing.at[:, :1], swing.at[:, 1:])[0])
         caught = bool(mdp.terminal[node])
         waited = motion.clock + 1 if caught else 0
-        if motion.place < 0 or waited > REST or swing.steps >= LONGEST:
+        if motion.place < 0 or waited > REST or swing.steps >= MAX_DECISIONS:
             random = motion.random.copy()
-            place = int(starts[below(random, len(starts))])
+            place = int(starts[random_integer(random, len(starts))])
             at, none = grid.nodes[place][None], np.zeros(1)
             swing = Swing(at, at, none, none, at[None])
             motion = replace(motion, place=place, random=random, clock=0)

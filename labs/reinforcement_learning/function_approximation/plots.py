@@ -4,7 +4,7 @@ import numpy as np
 
 from labs.arrays import Training
 from labs.plots import Curves, HeatMap, Plot, Readout, ShownWhen, Trace
-from labs.reinforcement_learning.function_approximation.subject import Fields
+from labs.reinforcement_learning.function_approximation.learning_world import Fields
 
 WALK: ShownWhen = {"world": ("walk",)}
 GIVEN: ShownWhen = {"world": ("walk", "surface")}
@@ -15,12 +15,12 @@ EXAMPLES: ShownWhen = {"world": ("star", "pair", "spiral")}
 TRIAD: ShownWhen = {"world": ("star", "pair")}
 SPIRAL: ShownWhen = {"world": ("spiral",)}
 NINE: ShownWhen = {"world": ("nine",)}
-ROWS = ("MC control", "SARSA", "Q-learning")
-COLUMNS = ("table", "linear", "nonlinear")
+CONVERGENCE_ROWS = ("MC control", "SARSA", "Q-learning")
+CONVERGENCE_COLUMNS = ("table", "linear", "nonlinear")
 AXES = ("angle from upright [rad]", "velocity [rad/s]")
-OTHERS = ("MC, table", "MC, linear", "SARSA, linear", "MC, nonlinear")
+CHANGE_LEARNERS = ("MC, table", "MC, linear", "SARSA, linear", "MC, nonlinear")
 """Learners whose changes of policy are plotted, and their cells in `nine`."""
-OTHER_CELLS = [0, 1, 4, 2]
+CHANGE_CELLS = [0, 1, 4, 2]
 
 
 def _map(title: str, z: str, z_label: str, when: ShownWhen = PLANE, arrows: str = "") -> HeatMap:
@@ -110,18 +110,18 @@ PLOTS: tuple[Plot, ...] = (
             f"Distance to the best q, {column}",
             "episodes",
             "root mean square",
-            Trace("rounds", f"distance_{column}", ROWS, series=1),
+            Trace("rounds", f"distance_{column}", CONVERGENCE_ROWS, series=1),
             log_x=True,
             log_y=True,
             when=NINE,
         )
-        for column in COLUMNS
+        for column in CONVERGENCE_COLUMNS
     ),
     Curves(
         "Changes of the greedy policy",
         "episodes",
         "so far",
-        Trace("rounds", "changes", OTHERS, series=1),
+        Trace("rounds", "changes", CHANGE_LEARNERS, series=1),
         log_x=True,
         when=NINE,
     ),
@@ -144,13 +144,13 @@ PLOTS: tuple[Plot, ...] = (
 )
 
 
-def spread(name: str, curves: np.ndarray, middle: str = "mean") -> Fields:
+def band_fields(name: str, curves: np.ndarray, middle: str = "mean") -> Fields:
     """The middle of S curves (S, k), the least and the largest."""
     center = np.median(curves, axis=0) if middle == "median" else curves.mean(axis=0)
     return {name: center, f"{name}_low": curves.min(axis=0), f"{name}_high": curves.max(axis=0)}
 
 
-def over_all(training: Training, **levels: float) -> Fields:
+def reference_lines(training: Training, **levels: float) -> Fields:
     """Horizontal lines at some levels, from the first to the last of the steps."""
     ends = training["steps"]
     ends = ends[[0, -1]] if len(ends) else ends

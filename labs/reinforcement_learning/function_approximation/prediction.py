@@ -33,9 +33,9 @@ from labs.arrays import Training
 from labs.problems.episodes import UpdateRule
 from labs.reinforcement_learning.function_approximation.given_policy import (
     GivenPolicy,
-    caught_pendulum,
-    surface,
-    walk,
+    pendulum_policy,
+    pendulum_prediction_task,
+    walk_policy,
 )
 from labs.reinforcement_learning.function_approximation.params import (
     ITERATIONS,
@@ -46,8 +46,8 @@ from labs.reinforcement_learning.function_approximation.predictors import (
     arrays_of,
     predictors_of,
 )
-from labs.resumable import Resumable, pieces
-from labs.tasks.random_walk.walks import THOUSAND, walk_task
+from labs.resumable import Resumable, split_work
+from labs.tasks.random_walk.walks import THOUSAND_STATE_WALK, walk_task
 
 TARGET_METHODS = {
     "oracle": ORACLE,
@@ -55,20 +55,20 @@ TARGET_METHODS = {
     "td": SEMI_GRADIENT_TD,
     "td-lambda": SEMI_GRADIENT_LAMBDA,
 }
-STEPS = 100
+EPISODE_STEPS = 100
 """Of an episode, about."""
-LIMIT = 1e3
+DIVERGENCE_LIMIT = 1e3
 """No weight that converges gets as large."""
 
 
 def given_policy(params: ApproximationParams) -> GivenPolicy:
     """What is judged."""
     if params.world == "walk":
-        return walk(params.features, round(params.n))
-    return surface(params.features, round(params.m))
+        return walk_policy(params.features, round(params.n))
+    return pendulum_policy(params.features, round(params.m))
 
 
-def begin(params: ApproximationParams, rng: np.random.Generator) -> Training:
+def initial_training(params: ApproximationParams, rng: np.random.Generator) -> Training:
     """All weights 0."""
     given = given_policy(params)
     size = given.features.size
@@ -87,11 +87,11 @@ def learn(params: ApproximationParams, training: Training) -> Resumable[Training
     given, rule = given_policy(params), _rule(params)
     if params.data == "latest":
         part = max(1, round(params.episodes / ITERATIONS))
-        after = yield from _by_episodes(params, given, rule, training, part)
-        return _recorded(training, after, part)
+        after = yield from _train_by_episodes(params, given, rule, training, part)
+        return _append_curves(training, after, part)
     batches = []
     for luck in training["luck"]:
-        batch = batch_of(params.world, luck.tobytes(), round(params.batch))
+        batch = collect_batch(params.world, luck.tobytes(), round(params.batch))
         if params.batch_target == "oracle":
             batch = batch._replace(returns=given.task.truth[batch.x])
         batches.append(batch)
@@ -103,12 +103,14 @@ def learn(params: ApproximationParams, training: Training) -> Resumable[Training
             yield
         training = {**training, "squares": np.array([given.error(w) for w in fitted])}
         if params.data == "batch":
-            return _recorded(training, {"w": np.stack(fitted), "errors": training["squares"]}, 1)
-    after = yield from _replayed(params, given, rule, training, batches)
-    return _recorded(training, after, 1)
+            return _append_curves(
+                training, {"w": np.stack(fitted), "errors": training["squares"]}, 1
+            )
+    after = yield from _train_by_replay(params, given, rule, training, batches)
+    return _append_curves(training, after, 1)
 
 
-def _by_episodes(
+def _train_by_episodes(
     params: ApproximationParams,
     given: GivenPolicy,
     rule: UpdateRule,
@@ -117,20 +119,20 @@ def _by_episodes(
 ) -> Resumable[dict[str, np.ndarray]]:
     """After so many further episodes, one learner after the other."""
     features, method = given.features, TARGET_METHODS[params.target]
-    work = STEPS * (3 * (features.active.shape[1] + 10))
+    work = EPISODE_STEPS * (3 * (features.active.shape[1] + 10))
     if method == SEMI_GRADIENT_LAMBDA:
-        work += STEPS * 2 * features.size  # the traces of all weights
+        work += EPISODE_STEPS * 2 * features.size  # the traces of all weights
     names, done = arrays_of(predictors_of(training)), []
     for s in range(LEARNERS):
         alone = predictors_of({name: array[s : s + 1] for name, array in names.items()})
-        for some in pieces(part, work):
+        for some in split_work(part, work):
             alone = approximation.step(given.task, features, rule, method, alone, some)
             yield
         done.append(arrays_of(alone))
     return {name: np.concatenate([one[name] for one in done]) for name in names}
 
 
-def _replayed(
+def _train_by_replay(
     params: ApproximationParams,
     given: GivenPolicy,
     rule: UpdateRule,
@@ -147,16 +149,16 @@ def _replayed(
             given.features, batch, gamma, rule, method, w[s], random[s], draws, done
         )
         count[s] += draws
-    alive = np.abs(w).max(axis=1) <= LIMIT
+    alive = np.abs(w).max(axis=1) <= DIVERGENCE_LIMIT
     w = np.where(alive[:, None], w, training["w"])
     errors = np.array([given.error(weights) for weights in w])
     return {"w": w, "random": random, "count": count, "errors": errors, "alive": alive}
 
 
 @lru_cache(maxsize=2 * LEARNERS)
-def batch_of(world: str, luck: bytes, episodes: int) -> TransitionBatch:
+def collect_batch(world: str, luck: bytes, episodes: int) -> TransitionBatch:
     """What so many episodes hold, drawn by the generator `luck`."""
-    task = walk_task(THOUSAND) if world == "walk" else caught_pendulum()[0]
+    task = walk_task(THOUSAND_STATE_WALK) if world == "walk" else pendulum_prediction_task()[0]
     return collect_transitions(task, np.frombuffer(luck, np.uint64).copy(), episodes)
 
 
@@ -171,10 +173,10 @@ def _bootstraps(params: ApproximationParams) -> bool:
 
 
 def _rule(params: ApproximationParams) -> UpdateRule:
-    return UpdateRule(params.alpha, params.omega, trace_decay=params.decay, limit=LIMIT)
+    return UpdateRule(params.alpha, params.omega, trace_decay=params.decay, limit=DIVERGENCE_LIMIT)
 
 
-def _recorded(training: Training, after: dict[str, np.ndarray], part: int) -> Training:
+def _append_curves(training: Training, after: dict[str, np.ndarray], part: int) -> Training:
     """With another point of each curve."""
     together = {**training, **after}
     last = training["error"][:, -1] if training["steps"].size else training["errors"]

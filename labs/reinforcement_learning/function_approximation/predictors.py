@@ -2,7 +2,7 @@
 
 from labs.algorithms.approximation import LinearPredictors
 from labs.arrays import Training
-from labs.reinforcement_learning.function_approximation.subject import Fields
+from labs.reinforcement_learning.function_approximation.learning_world import Fields
 
 
 def arrays_of(learners: LinearPredictors) -> Fields:
@@ -13,7 +13,7 @@ def arrays_of(learners: LinearPredictors) -> Fields:
         "count": learners.count,
         "random": learners.random,
         "errors": learners.errors,
-        "alive": learners.sound,
+        "alive": learners.bounded,
     }
 
 
@@ -25,5 +25,5 @@ def predictors_of(training: Training) -> LinearPredictors:
         count=training["count"],
         random=training["random"],
         errors=training["errors"],
-        sound=training["alive"],
+        bounded=training["alive"],
     )

@@ -23,24 +23,24 @@ where right seems better, it is tried, found to be cheaper, and w grows until q(
 import numpy as np
 
 from labs.algorithms.exploration import BehaviourPolicy
-from labs.algorithms.features import Features, aggregation, table, vanishing
+from labs.algorithms.features import Features, state_aggregation, tabular_features, zero_features_at
 from labs.compiled import compiled
 from labs.problems.episodes import EpisodicTask, UpdateRule, episodic_task, step_size
 from labs.problems.finite_mdp import FiniteMDP
-from labs.random_numbers import below, uniform
+from labs.random_numbers import random_integer, uniform
 
 GAMMA, EPSILON = 0.5, 0.2
 """Discount in the rooms; chance of any door, for ever."""
 RULE = UpdateRule(1.0, 0.6, limit=1e6)
 """Steps that shrink as Robbins and Monro ask."""
 BEHAVIOUR = BehaviourPolicy(epsilon=EPSILON)
-_END = np.array([False, False, True])
-ALIKE: Features = vanishing(aggregation(np.array([0, 0, 1])), _END)
+_TERMINAL = np.array([False, False, True])
+ALIASED_FEATURES: Features = zero_features_at(state_aggregation(np.array([0, 0, 1])), _TERMINAL)
 """The rooms share their features."""
-APART: Features = vanishing(table(3), _END)
-BEST = np.array([[0.0, 2.0], [3.0, 0.0]])
+TABULAR_FEATURES: Features = zero_features_at(tabular_features(3), _TERMINAL)
+OPTIMAL_Q = np.array([[0.0, 2.0], [3.0, 0.0]])
 """Q* of rooms and doors."""
-BEST_EXPLORING = np.array([[GAMMA * EPSILON / 2.0 * 3.0, 2.0], [3.0, 0.0]])
+EXPLORING_OPTIMAL_Q = np.array([[GAMMA * EPSILON / 2.0 * 3.0, 2.0], [3.0, 0.0]])
 """Q of the best policy that still tries any door with probability EPSILON."""
 WHEEL_COSTS = np.array([1.5, -0.5])
 
@@ -49,7 +49,7 @@ def rooms() -> EpisodicTask:
     """From room 1."""
     successor = np.array([[1, 2], [2, 2], [2, 2]], np.int32)
     cost = np.array([[0.0, 2.0], [3.0, 0.0], [0.0, 0.0]])
-    return episodic_task(FiniteMDP(cost, GAMMA, _END, successor=successor), [0], 10)
+    return episodic_task(FiniteMDP(cost, GAMMA, _TERMINAL, successor=successor), [0], 10)
 
 
 @compiled
@@ -64,14 +64,16 @@ def wheel_q(w: float) -> tuple[float, float, float, float]:
 
 
 @compiled
-def turn_wheel(w: float, random: np.ndarray, rule: UpdateRule, updates: int, done: int) -> float:
+def update_wheel_weight(
+    w: float, random: np.ndarray, rule: UpdateRule, updates: int, done: int
+) -> float:
     """w after so many further episodes of one step, `done` before them. `random` (4,) changes in
     place."""
     for n in range(done + 1, done + updates + 1):
         left, right, left_slope, right_slope = wheel_q(w)
         goes_left = left < right
         if uniform(random) < EPSILON:
-            goes_left = below(random, 2) == 0
+            goes_left = random_integer(random, 2) == 0
         if goes_left:
             w += step_size(rule, n) * (1.5 - left) * left_slope
         else:

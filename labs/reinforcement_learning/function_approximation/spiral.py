@@ -28,7 +28,7 @@ import numpy as np
 from labs.arrays import Training
 from labs.compiled import compiled
 from labs.problems.episodes import UpdateRule, step_size
-from labs.random_numbers import below, seeded, uniform
+from labs.random_numbers import random_integer, random_states, uniform
 from labs.reinforcement_learning.function_approximation.params import (
     ITERATIONS,
     LEARNERS,
@@ -37,34 +37,44 @@ from labs.reinforcement_learning.function_approximation.params import (
 from labs.resumable import Resumable
 
 EPS = 0.05
-TURN = np.sqrt(3.0) / 2.0
+TURN_RATE = np.sqrt(3.0) / 2.0
 """[rad] per unit of w."""
-ALONG = np.array([10.0, -7.0, -3.0])
+INITIAL_VALUES = np.array([10.0, -7.0, -3.0])
 """V(0)."""
-ACROSS = np.array([ALONG[1] - ALONG[2], ALONG[2] - ALONG[0], ALONG[0] - ALONG[1]]) / np.sqrt(3.0)
-"""V(0) after a quarter of a turn: V(w) = e^(eps w) (cos(TURN w) ALONG - sin(TURN w) ACROSS)."""
+QUARTER_TURN_VALUES = np.array(
+    [
+        INITIAL_VALUES[1] - INITIAL_VALUES[2],
+        INITIAL_VALUES[2] - INITIAL_VALUES[0],
+        INITIAL_VALUES[0] - INITIAL_VALUES[1],
+    ]
+) / np.sqrt(3.0)
+"""V(0) after a quarter of a turn: V(w) =
+e^(eps w) (cos(TURN_RATE w) INITIAL_VALUES - sin(TURN_RATE w) QUARTER_TURN_VALUES)."""
 P = np.array([[0.5, 0.0, 0.5], [0.5, 0.5, 0.0], [0.0, 0.5, 0.5]])
 Q = np.array([[1.0, 0.5, 1.5], [1.5, 1.0, 0.5], [0.5, 1.5, 1.0]])
-LIMIT = 300.0
+DIVERGENCE_LIMIT = 300.0
 """A value beyond this has diverged: the weight stays at the one before."""
 
 
-def curve(w: np.ndarray) -> np.ndarray:
+def spiral_values(w: np.ndarray) -> np.ndarray:
     """V (..., 3) of weights (...)."""
     w = np.asarray(w, float)[..., None]
-    return np.asarray(np.exp(EPS * w) * (np.cos(TURN * w) * ALONG - np.sin(TURN * w) * ACROSS))
+    return np.asarray(
+        np.exp(EPS * w)
+        * (np.cos(TURN_RATE * w) * INITIAL_VALUES - np.sin(TURN_RATE * w) * QUARTER_TURN_VALUES)
+    )
 
 
-def outward_threshold() -> float:
+def divergence_threshold() -> float:
     """The discount beyond which TD(0) goes outwards."""
     return 8.0 * EPS / (3.0 + 2.0 * EPS)
 
 
-def begin(params: ApproximationParams, rng: np.random.Generator) -> Training:
+def initial_training(params: ApproximationParams, rng: np.random.Generator) -> Training:
     """At V(0)."""
     return {
         "w": np.zeros(LEARNERS),
-        "random": seeded(rng, LEARNERS),
+        "random": random_states(rng, LEARNERS),
         "steps": np.zeros(1),
         "error": value_error(np.zeros(LEARNERS))[:, None],
         "path": np.zeros((LEARNERS, 1)),
@@ -77,8 +87,8 @@ def learn(params: ApproximationParams, training: Training) -> Resumable[Training
     part = max(1, round(params.updates / ITERATIONS))
     w, random = training["w"].copy(), training["random"].copy()
     done = int(training["steps"][-1])
-    rule = UpdateRule(params.alpha, params.omega, limit=LIMIT)
-    sound = follow(w, random, rule, params.gamma, params.bootstrap, part, done)
+    rule = UpdateRule(params.alpha, params.omega, limit=DIVERGENCE_LIMIT)
+    sound = update_weights(w, random, rule, params.gamma, params.bootstrap, part, done)
     yield from ()
     return {
         "w": w,
@@ -92,16 +102,22 @@ def learn(params: ApproximationParams, training: Training) -> Resumable[Training
 
 def value_error(w: np.ndarray) -> np.ndarray:
     """sqrt of the value error (...) of weights (...)."""
-    return np.asarray(np.linalg.norm(curve(w), axis=-1) / np.sqrt(3.0))
+    return np.asarray(np.linalg.norm(spiral_values(w), axis=-1) / np.sqrt(3.0))
 
 
 @compiled
 def _value(w: float, x: int) -> float:
-    return float(np.exp(EPS * w) * (np.cos(TURN * w) * ALONG[x] - np.sin(TURN * w) * ACROSS[x]))
+    return float(
+        np.exp(EPS * w)
+        * (
+            np.cos(TURN_RATE * w) * INITIAL_VALUES[x]
+            - np.sin(TURN_RATE * w) * QUARTER_TURN_VALUES[x]
+        )
+    )
 
 
 @compiled
-def follow(
+def update_weights(
     weights: np.ndarray,
     random: np.ndarray,
     rule: UpdateRule,
@@ -116,11 +132,14 @@ def follow(
     for s in range(len(weights)):
         w = weights[s]
         for n in range(done + 1, done + updates + 1):
-            x = below(random[s], 3)
+            x = random_integer(random[s], 3)
             y = x if uniform(random[s]) < 0.5 else (x + 2) % 3
             v = _value(w, x)
-            turned = np.sin(TURN * w) * ALONG[x] + np.cos(TURN * w) * ACROSS[x]
-            slope = EPS * v - TURN * np.exp(EPS * w) * turned
+            turned = (
+                np.sin(TURN_RATE * w) * INITIAL_VALUES[x]
+                + np.cos(TURN_RATE * w) * QUARTER_TURN_VALUES[x]
+            )
+            slope = EPS * v - TURN_RATE * np.exp(EPS * w) * turned
             target = gamma * _value(w, y) if bootstrap else 0.0
             moved = w + step_size(rule, n) * (target - v) * slope
             largest = max(abs(_value(moved, 0)), abs(_value(moved, 1)), abs(_value(moved, 2)))
@@ -134,5 +153,5 @@ def follow(
 
 def in_plane(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Two coordinates (...) of values (..., 3) that sum to 0: along V(0) and across it."""
-    length = np.linalg.norm(ALONG)
-    return values @ ALONG / length, values @ ACROSS / length
+    length = np.linalg.norm(INITIAL_VALUES)
+    return values @ INITIAL_VALUES / length, values @ QUARTER_TURN_VALUES / length

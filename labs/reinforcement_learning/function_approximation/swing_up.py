@@ -26,42 +26,42 @@ from labs.algorithms.bellman import q_values
 from labs.algorithms.exploration import BehaviourPolicy
 from labs.algorithms.features import Features
 from labs.algorithms.linear_control import LinearControllers, q_table
-from labs.algorithms.policy_evaluation import exact
+from labs.algorithms.policy_evaluation import exact_values
 from labs.arrays import Training
 from labs.problems.episodes import EpisodicTask, UpdateRule, episodic_task
 from labs.problems.finite_mdp import FiniteMDP, random_policy
 from labs.problems.prediction import prediction_task
 from labs.reinforcement_learning.function_approximation.feature_sets import plane_features
-from labs.reinforcement_learning.function_approximation.given_policy import GAMMA, PENDULUM
+from labs.reinforcement_learning.function_approximation.given_policy import GAMMA, PENDULUM_GRID
 from labs.reinforcement_learning.function_approximation.params import (
     CONTROLLERS,
     ITERATIONS,
     LEARNERS,
     ApproximationParams,
 )
-from labs.resumable import Resumable, pieces
+from labs.resumable import Resumable, split_work
 
-HORIZON, SHORT = 100, 20
+HORIZON, BATCH_HORIZON = 100, 20
 """Steps of an episode, and of one of the batch."""
-LIMIT = 1e4
+DIVERGENCE_LIMIT = 1e4
 """An error beyond this diverges: all costs to come are below 24."""
-HANGING = int(PENDULUM.state(np.zeros(1), np.zeros(1)))
+HANGING_STATE = int(PENDULUM_GRID.state(np.zeros(1), np.zeros(1)))
 
 
 @lru_cache(maxsize=1)
 def swing_task() -> tuple[FiniteMDP, EpisodicTask, np.ndarray]:
     """The model, its episodes from hanging at rest, and Q* (X, U)."""
-    mdp = PENDULUM.mdp(GAMMA)
+    mdp = PENDULUM_GRID.mdp(GAMMA)
     value, _, _ = policy_iteration.optimum(mdp, np.zeros(mdp.X, np.int64))
-    return mdp, episodic_task(mdp, [HANGING], HORIZON), q_values(mdp, value)
+    return mdp, episodic_task(mdp, [HANGING_STATE], HORIZON), q_values(mdp, value)
 
 
 def features_of(params: ApproximationParams) -> Features:
     """Of the plane's nodes."""
-    return plane_features(params.features, round(params.m), PENDULUM)
+    return plane_features(params.features, round(params.m), PENDULUM_GRID)
 
 
-def begin(params: ApproximationParams, rng: np.random.Generator) -> Training:
+def initial_training(params: ApproximationParams, rng: np.random.Generator) -> Training:
     """All weights 0."""
     first = linear_control.init(swing_task()[1], features_of(params), LEARNERS, rng)
     none = np.zeros((LEARNERS, 0))
@@ -77,17 +77,20 @@ def begin(params: ApproximationParams, rng: np.random.Generator) -> Training:
 
 def learn(params: ApproximationParams, training: Training) -> Resumable[Training]:
     """The next hundredth of the episodes, or of the draws from a batch; or the next fit."""
-    features, rule = features_of(params), UpdateRule(params.alpha, params.omega, limit=LIMIT)
+    features, rule = (
+        features_of(params),
+        UpdateRule(params.alpha, params.omega, limit=DIVERGENCE_LIMIT),
+    )
     if params.data == "latest":
         part = max(1, round(params.episodes / ITERATIONS))
-        after = yield from _by_episodes(params, features, rule, training, part)
+        after = yield from _train_by_episodes(params, features, rule, training, part)
     else:
         part = 1
-        after = yield from _from_batches(params, features, rule, training)
-    return (yield from _recorded(features, {**training, **after}, part))
+        after = yield from _train_from_batches(params, features, rule, training)
+    return (yield from _append_curves(features, {**training, **after}, part))
 
 
-def _by_episodes(
+def _train_by_episodes(
     params: ApproximationParams,
     features: Features,
     rule: UpdateRule,
@@ -103,19 +106,19 @@ def _by_episodes(
             training[name][s : s + 1] for name in ("w", "visits", "random", "alive")
         )
         alone = LinearControllers(w, visits, random, none, none.astype(np.int64), alive)
-        for some in pieces(part, work):
+        for some in split_work(part, work):
             alone = linear_control.step(task, features, behaviour, rule, method, alone, some)
             yield
         done.append(_arrays(alone))
     return {name: np.concatenate([one[name] for one in done]) for name in done[0]}
 
 
-def _from_batches(
+def _train_from_batches(
     params: ApproximationParams, features: Features, rule: UpdateRule, training: Training
 ) -> Resumable[dict[str, np.ndarray]]:
     w, random, drawn = (training[name].copy() for name in ("w", "random", "drawn"))
     for s, luck in enumerate(training["luck"]):
-        batch = batch_of(luck.tobytes(), round(params.batch))
+        batch = collect_batch(luck.tobytes(), round(params.batch))
         if params.data == "batch":
             w[s] = yield from fitted_q_iteration(features, batch, GAMMA, w[s])
             continue
@@ -125,32 +128,32 @@ def _from_batches(
             features, batch, GAMMA, rule, w[s], random[s], draws, done
         )
         drawn[s] += draws
-    alive = np.abs(w).max(axis=(1, 2)) <= LIMIT
+    alive = np.abs(w).max(axis=(1, 2)) <= DIVERGENCE_LIMIT
     w = np.where(alive[:, None, None], w, training["w"])
     return {"w": w, "random": random, "drawn": drawn, "alive": alive}
 
 
 @lru_cache(maxsize=2 * LEARNERS)
-def batch_of(luck: bytes, episodes: int) -> TransitionBatch:
+def collect_batch(luck: bytes, episodes: int) -> TransitionBatch:
     """Short episodes from anywhere, torques drawn evenly by the generator `luck`."""
     mdp = swing_task()[0]
     unknown = np.zeros(mdp.X)  # nobody asks what the random policy is worth
-    task = prediction_task(mdp, random_policy(mdp), unknown, range(mdp.X), SHORT)
+    task = prediction_task(mdp, random_policy(mdp), unknown, range(mdp.X), BATCH_HORIZON)
     return collect_transitions(task, np.frombuffer(luck, np.uint64).copy(), episodes)
 
 
 def _arrays(learners: LinearControllers) -> dict[str, np.ndarray]:
     names = ("w", "visits", "random")
-    return {name: getattr(learners, name) for name in names} | {"alive": learners.sound}
+    return {name: getattr(learners, name) for name in names} | {"alive": learners.bounded}
 
 
-def _recorded(features: Features, training: Training, part: int) -> Resumable[Training]:
+def _append_curves(features: Features, training: Training, part: int) -> Resumable[Training]:
     """With another point of each curve."""
     mdp, _, q_star = swing_task()
     greedy, error = [], []
     for w in training["w"]:
         q = q_table(features, w)
-        greedy.append(float(exact(mdp, q.argmin(axis=1))[HANGING]))
+        greedy.append(float(exact_values(mdp, q.argmin(axis=1))[HANGING_STATE]))
         error.append(float(np.sqrt(np.mean((q.min(axis=1) - q_star.min(axis=1)) ** 2))))
         yield
     done = float(training["steps"][-1]) if training["steps"].size else 0.0

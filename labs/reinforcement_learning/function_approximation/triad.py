@@ -15,7 +15,7 @@ import numpy as np
 
 from labs.algorithms import approximation
 from labs.algorithms.approximation import ORACLE, SEMI_GRADIENT_TD, TDC
-from labs.algorithms.features import from_matrix
+from labs.algorithms.features import features_from_matrix
 from labs.arrays import Training
 from labs.problems.episodes import UpdateRule
 from labs.reinforcement_learning.function_approximation.counterexamples import (
@@ -34,16 +34,16 @@ from labs.reinforcement_learning.function_approximation.predictors import (
 )
 from labs.resumable import Resumable
 
-LIMIT = 1e6
+DIVERGENCE_LIMIT = 1e6
 """What is larger has diverged."""
 HORIZON = 10
 """Steps of an episode on the star, where every start is as likely as every later state."""
-LONG = 1000
+LONG_HORIZON = 1000
 """Of an episode of two states on-policy."""
 
 
 @lru_cache(maxsize=16)
-def example_of(
+def counterexample_of(
     world: str, gamma: float, ending: float, approximate: bool, off_policy: bool
 ) -> Counterexample:
     """The task with its features, or with a table that begins with the same values."""
@@ -51,55 +51,57 @@ def example_of(
         found = baird(HORIZON, gamma, off_policy)
     else:
         # On-policy an episode begins in the first state and runs to its end.
-        starts, horizon = ((0, 1), 1) if off_policy else ((0,), LONG)
+        starts, horizon = ((0, 1), 1) if off_policy else ((0,), LONG_HORIZON)
         found = two_states(gamma, ending, starts, horizon)
     if approximate:
         return found
     phi = found.features.dense
     own = np.diag((phi != 0.0).any(axis=1).astype(float))
-    return found._replace(features=from_matrix(own), w=phi @ found.w)
+    return found._replace(features=features_from_matrix(own), w=phi @ found.w)
 
 
-def example(params: ApproximationParams) -> Counterexample:
+def counterexample(params: ApproximationParams) -> Counterexample:
     """What is learned."""
     # Without discount values on the star have no end; in two states an end has to come.
     gamma = min(params.gamma, 0.999)
-    return example_of(params.world, gamma, params.ending, params.approximate, params.off_policy)
+    return counterexample_of(
+        params.world, gamma, params.ending, params.approximate, params.off_policy
+    )
 
 
-def mean_matrix(params: ApproximationParams) -> np.ndarray:
+def mean_update_matrix(params: ApproximationParams) -> np.ndarray:
     """A (d, d): the mean step of the method is -alpha A w."""
-    _, features, _, mdp = example(params)
+    _, features, _, mdp = counterexample(params)
     phi = features.dense
     mu, P = task_frequencies(params)
     if not params.bootstrap:
         return np.asarray(phi.T @ (mu[:, None] * phi))
-    A, _ = approximation.mean_update(P, np.zeros(mdp.X), float(mdp.gamma), phi, mu)
+    A, _ = approximation.expected_td_update(P, np.zeros(mdp.X), float(mdp.gamma), phi, mu)
     return A
 
 
 @lru_cache(maxsize=4)
 def eigenvalues(params: ApproximationParams) -> np.ndarray:
     """(d,) of -A."""
-    return np.linalg.eigvals(-mean_matrix(params))
+    return np.linalg.eigvals(-mean_update_matrix(params))
 
 
 def task_frequencies(params: ApproximationParams) -> tuple[np.ndarray, np.ndarray]:
     """mu (X,), how often each state is learned from, and P (X, X) of the policy judged."""
-    P = example(params).mdp.probabilities
+    P = counterexample(params).mdp.probabilities
     if params.world == "star":
         judged = P[1] if params.off_policy else (6.0 * P[0] + P[1]) / 7.0
         return np.full(7, 1.0 / 7.0), judged
     if params.off_policy:
         return np.array([0.5, 0.5, 0.0]), P[0]
     # The second state is left with probability p; an endless one is cut.
-    stay = min(1.0 / max(params.ending, 1.0 / LONG), LONG - 1.0)
+    stay = min(1.0 / max(params.ending, 1.0 / LONG_HORIZON), LONG_HORIZON - 1.0)
     return np.array([1.0, stay, 0.0]) / (1.0 + stay), P[0]
 
 
-def begin(params: ApproximationParams, rng: np.random.Generator) -> Training:
+def initial_training(params: ApproximationParams, rng: np.random.Generator) -> Training:
     """The weights of the literature."""
-    task, features, w, _ = example(params)
+    task, features, w, _ = counterexample(params)
     first = approximation.init(task, features, w, LEARNERS, rng)
     return {
         "steps": np.zeros(1),
@@ -111,8 +113,8 @@ def begin(params: ApproximationParams, rng: np.random.Generator) -> Training:
 
 def learn(params: ApproximationParams, training: Training) -> Resumable[Training]:
     """The next hundredth of the updates."""
-    task, features, _, _ = example(params)
-    rule = UpdateRule(params.alpha, params.omega, limit=LIMIT, beta=params.beta)
+    task, features, _, _ = counterexample(params)
+    rule = UpdateRule(params.alpha, params.omega, limit=DIVERGENCE_LIMIT, beta=params.beta)
     method = ORACLE
     if params.bootstrap:
         method = TDC if params.correct else SEMI_GRADIENT_TD
@@ -129,7 +131,7 @@ def learn(params: ApproximationParams, training: Training) -> Resumable[Training
         "steps": np.append(training["steps"], float(after.count.max())),
         "error": np.column_stack([training["error"], errors]),
         "path": np.concatenate([training["path"], after.w[:, None]], axis=1),
-        "sound": np.array(bool(after.sound.all())),
+        "sound": np.array(bool(after.bounded.all())),
     }
 
 
@@ -139,4 +141,4 @@ def _episode_length(params: ApproximationParams) -> float:
         return float(HORIZON)
     if params.off_policy:
         return 1.0
-    return float(min(1.0 + 1.0 / max(params.ending, 1.0 / LONG), LONG))
+    return float(min(1.0 + 1.0 / max(params.ending, 1.0 / LONG_HORIZON), LONG_HORIZON))

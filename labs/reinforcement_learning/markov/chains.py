@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from labs.errors import LabError
-from labs.number_texts import parse_number, plain_text
+from labs.number_texts import parse_number, strip_comments
 from labs.tasks.mdp_table.table import MdpTable, parse_table
 
 STUDENT = """state,    cost, Lecture, Exercise, Code, Café, Phone, Sleep
@@ -93,7 +93,7 @@ def parse_rows(text: str) -> dict[int, np.ndarray]:
     """Rows to put in the place of a chain's own, "2: 0 0.5 0.5" a line, by the number of the
     state from 0; weights are scaled to sum to 1. Raises LabError."""
     rows: dict[int, np.ndarray] = {}
-    for line in filter(str.strip, plain_text(text).splitlines()):
+    for line in filter(str.strip, strip_comments(text).splitlines()):
         number, colon, entries = line.partition(":")
         try:
             x, weights = int(number) - 1, np.array(list(map(parse_number, entries.split())))
@@ -111,7 +111,7 @@ def parse_rows(text: str) -> dict[int, np.ndarray]:
     return rows
 
 
-def write_rows(rows: Mapping[int, np.ndarray]) -> str:
+def format_rows(rows: Mapping[int, np.ndarray]) -> str:
     """The text that says them."""
     lines = (
         f"{x + 1}: " + " ".join(f"{round(float(p), ROW_DECIMALS):g}" for p in rows[x])
@@ -120,7 +120,7 @@ def write_rows(rows: Mapping[int, np.ndarray]) -> str:
     return "\n".join(lines)
 
 
-def with_rows(P: np.ndarray, rows: Mapping[int, np.ndarray]) -> np.ndarray:
+def replace_rows(P: np.ndarray, rows: Mapping[int, np.ndarray]) -> np.ndarray:
     """A copy of P (X, X) with those rows in it that fit."""
     new = P.copy()
     for x, row in rows.items():
@@ -129,7 +129,7 @@ def with_rows(P: np.ndarray, rows: Mapping[int, np.ndarray]) -> np.ndarray:
     return new
 
 
-def with_probability(row: np.ndarray, y: int, p: float, own: np.ndarray) -> np.ndarray:
+def set_probability(row: np.ndarray, y: int, p: float, own: np.ndarray) -> np.ndarray:
     """A copy of a row (X,) of probabilities in which state y has the probability p. The others
     keep their proportions; where y had all, they have those of `own` (X,), or share alike."""
     if len(row) == 1:

@@ -6,46 +6,55 @@ from labs.algorithms.markov_chain import CommunicatingClass, can_reach, is_irred
 from labs.reinforcement_learning.markov.reward_process import RewardProcess
 from labs.rounding import round_up
 
-TIE = 1e-9
+TIE_TOLERANCE = 1e-9
 """Values that differ by less are equal, relative to the largest of them and of the costs."""
 ROUNDING = 1e-15
 """Of an eigenvalue near 1."""
-CANCELLED = 1e-12
+ZERO_MEAN_TOLERANCE = 1e-12
 """A mean cost is 0 if it is smaller than this, relative to the mean of its magnitudes."""
 
 
-def about_chain(process: RewardProcess, source: int, target: int) -> str:
+def describe_chain(process: RewardProcess, source: int, target: int) -> str:
     """The structure of P, and whether it can be edited; a paragraph a line."""
-    about = [*structure(process), *process.table.notes, edits(process, source, target)]
+    about = [
+        *describe_structure(process),
+        *process.table.notes,
+        edit_error(process, source, target),
+    ]
     return "\n".join(filter(None, about))
 
 
-def about_value(process: RewardProcess, gamma: float) -> str:
+def describe_value(process: RewardProcess, gamma: float) -> str:
     """What the discount does to V, and the controls; a paragraph a line."""
-    return "\n".join(filter(None, [value(process, gamma), controls(process, gamma)]))
+    return "\n".join(
+        filter(None, [describe_discount(process, gamma), describe_controls(process, gamma)])
+    )
 
 
-def structure(process: RewardProcess) -> list[str]:
+def describe_structure(process: RewardProcess) -> list[str]:
     """Irreducible or not, periodic or not, and how many stationary distributions there are."""
     names, classes = process.table.states, process.classes
     closed = [c for c in classes if c.closed]
     if is_irreducible(classes):
         text = ["Irreducible: every state leads to every other."]
     else:
-        text = ["Not irreducible: not every state leads to every other. " + _parts(names, classes)]
+        text = [
+            "Not irreducible: not every state leads to every other. "
+            + _describe_classes(names, classes)
+        ]
     if len(closed) == 1:
-        text.append(_one_end(names, process.eigenvalues, closed[0]))
+        text.append(_describe_convergence(names, process.eigenvalues, closed[0]))
     else:
         text.append(
             f"{_count(len(closed))} closed classes: P has the eigenvalue 1 {_times(len(closed))}, "
             "and every mixture of their distributions is stationary. Where the walk begins (and "
             "its luck) decides."
         )
-        text += [_round_trip(names, c) for c in closed if c.period > 1]
+        text += [_describe_period(names, c) for c in closed if c.period > 1]
     return text
 
 
-def value(process: RewardProcess, gamma: float) -> str:
+def describe_discount(process: RewardProcess, gamma: float) -> str:
     """What the discount does to V."""
     if gamma == 0.0:
         return "γ = 0, myopic: V = C, the next cost is all that counts."
@@ -63,10 +72,10 @@ def value(process: RewardProcess, gamma: float) -> str:
             f"{singular}V exists all the same: the chain is sure to end in {ends}, for nothing. "
             "Put V = 0 there, and the system of the other states is regular."
         )
-    return f"{singular}{_unending(process, found.finite)} Take γ < 1."
+    return f"{singular}{_describe_infinite_cost(process, found.finite)} Take γ < 1."
 
 
-def _unending(process: RewardProcess, finite: np.ndarray) -> str:
+def _describe_infinite_cost(process: RewardProcess, finite: np.ndarray) -> str:
     """From where costs go on for ever, from where they may, and from where they do not (`finite`):
     a matter of which states lead to which."""
     names, P = process.table.states, process.P
@@ -76,7 +85,7 @@ def _unending(process: RewardProcess, finite: np.ndarray) -> str:
         process.long_run @ process.C,
         process.long_run @ np.abs(process.C),
     )  # of a step, long run
-    mean[np.abs(mean) <= CANCELLED * size] = 0.0
+    mean[np.abs(mean) <= ZERO_MEAN_TOLERANCE * size] = 0.0
     which = "every state" if len(never) == len(names) else _join_names(names, never)
     stays = np.concatenate([c.states for c in process.classes if c.closed])
     if not mean[stays].any():
@@ -104,7 +113,7 @@ def _unending(process: RewardProcess, finite: np.ndarray) -> str:
     return text
 
 
-def controls(process: RewardProcess, gamma: float) -> str:
+def describe_controls(process: RewardProcess, gamma: float) -> str:
     """In which states one control would be cheaper than the policy; empty where there is no
     choice or no V."""
     table, found = process.table, process.cost_to_go(gamma)
@@ -112,18 +121,19 @@ def controls(process: RewardProcess, gamma: float) -> str:
         return ""
     Q = process.action_values(gamma, found.V)
     best = Q.argmin(axis=1)
-    tie = TIE * (np.abs(table.C).max() + np.abs(found.V).max())
+    tie = TIE_TOLERANCE * (np.abs(table.C).max() + np.abs(found.V).max())
     wins = np.flatnonzero(Q.min(axis=1) < found.V - tie)
     if not len(wins):
         return "No control is better than this policy: V = min Q in every state."
     phrases = [
-        f"{table.controls[best[x]]} in {table.states[x]} ({_less(Q[x, best[x]], found.V[x])})"
+        f"{table.controls[best[x]]} in {table.states[x]} "
+        f"({_format_less(Q[x, best[x]], found.V[x])})"
         for x in wins
     ]
     return f"Once, and then the policy, is cheaper (Q < V): {', '.join(phrases)}."
 
 
-def edits(process: RewardProcess, source: int, target: int) -> str:
+def edit_error(process: RewardProcess, source: int, target: int) -> str:
     """Why the chosen transition cannot be edited; empty where it can."""
     if len(process.table.controls) > 1:
         return "These probabilities follow from the policy: they are changed in the table only."
@@ -133,7 +143,7 @@ def edits(process: RewardProcess, source: int, target: int) -> str:
     return f"There is no state {missing} in this chain: choose a transition between its states."
 
 
-def _parts(names: tuple[str, ...], classes: list[CommunicatingClass]) -> str:
+def _describe_classes(names: tuple[str, ...], classes: list[CommunicatingClass]) -> str:
     closed = [_join_names(names, c.states) for c in classes if c.closed]
     passed = np.concatenate([c.states for c in classes if not c.closed] or [np.zeros(0, int)])
     text = f"Nothing leads out of {' or out of '.join(closed)}."
@@ -143,9 +153,11 @@ def _parts(names: tuple[str, ...], classes: list[CommunicatingClass]) -> str:
     return text
 
 
-def _one_end(names: tuple[str, ...], modes: np.ndarray, end: CommunicatingClass) -> str:
+def _describe_convergence(
+    names: tuple[str, ...], modes: np.ndarray, end: CommunicatingClass
+) -> str:
     if end.period > 1:
-        return _round_trip(names, end)
+        return _describe_period(names, end)
     magnitudes = np.abs(modes)
     second = float(magnitudes[1]) if len(magnitudes) > 1 else 0.0
     if len(magnitudes) == 1:
@@ -166,7 +178,7 @@ def _one_end(names: tuple[str, ...], modes: np.ndarray, end: CommunicatingClass)
     )
 
 
-def _round_trip(names: tuple[str, ...], c: CommunicatingClass) -> str:
+def _describe_period(names: tuple[str, ...], c: CommunicatingClass) -> str:
     where = "" if len(c.states) == len(names) else f" within {_join_names(names, c.states)}"
     return (
         f"Periodic: ways back{where} take multiples of {c.period} steps. {_count(c.period)} "
@@ -184,7 +196,7 @@ def _number(value: float, digits: int = 3) -> str:
     return f"{value:.{digits}g}".replace("-", "−")
 
 
-def _less(a: float, b: float) -> str:
+def _format_less(a: float, b: float) -> str:
     """a < b, in as many digits as it takes to see it."""
     digits = next((d for d in range(3, 17) if f"{a:.{d}g}" != f"{b:.{d}g}"), 17)
     return f"{_number(a, digits)} < {_number(b, digits)}"

@@ -6,21 +6,21 @@ import numpy as np
 
 ACROSS, ALONG, HEIGHT = 1.2, 0.85, 0.02
 """Half the axes of the ellipse, and how high over the floor it lies."""
-PAD = 0.26
+TILE_SIZE = 0.26
 """Side of the tile under a state."""
 NEAR, BEND = 0.2, 0.16
 """From a state's middle to where a ribbon begins; how far it bows out, by its length."""
-LOOP, MOUTH = 0.15, 0.5
+LOOP, LOOP_OPENING = 0.15, 0.5
 """Radius of the ribbon from a state to itself; half the angle at which it is open [rad]."""
 THIN, WIDE = 0.004, 0.04
 """Half the width of a ribbon of probability 0, and what probability 1 adds."""
 HEAD = 0.8
 """Where on a ribbon its head begins, from 0 to 1."""
-GRAIN = 24
+RIBBON_POINTS = 24
 """Points of a ribbon before its head."""
-NEVER, ALWAYS = 0.12, 0.76
+BEAD_START, BEAD_END = 0.12, 0.76
 """Where on a ribbon the beads of probability 0 and 1 lie, from 0 to 1."""
-REST = np.array([0.0, 0.0, 0.1])
+TOKEN_OFFSET = np.array([0.0, 0.0, 0.1])
 """From a tile to the token on it."""
 
 
@@ -35,8 +35,13 @@ def ribbon_points(where: np.ndarray, x: int, y: int, s: np.ndarray) -> np.ndarra
     if x == y:
         outward = where[x] * (1.0, 1.0, 0.0)
         outward /= np.linalg.norm(outward)
-        center = where[x] + (PAD / 2 + LOOP) * outward
-        angle = np.arctan2(outward[1], outward[0]) + np.pi + MOUTH + (2.0 * np.pi - 2.0 * MOUTH) * s
+        center = where[x] + (TILE_SIZE / 2 + LOOP) * outward
+        angle = (
+            np.arctan2(outward[1], outward[0])
+            + np.pi
+            + LOOP_OPENING
+            + (2.0 * np.pi - 2.0 * LOOP_OPENING) * s
+        )
         turn = np.stack([np.cos(angle), np.sin(angle), np.zeros(len(s))], axis=1)
         loop: np.ndarray = center + LOOP * turn
         return loop
@@ -51,14 +56,16 @@ def ribbon_points(where: np.ndarray, x: int, y: int, s: np.ndarray) -> np.ndarra
 
 def bead_place(where: np.ndarray, x: int, y: int, p: float) -> np.ndarray:
     """(3,): the place on the ribbon from x to y that stands for the probability p."""
-    place: np.ndarray = ribbon_points(where, x, y, np.array([NEVER + (ALWAYS - NEVER) * p]))[0]
+    place: np.ndarray = ribbon_points(
+        where, x, y, np.array([BEAD_START + (BEAD_END - BEAD_START) * p])
+    )[0]
     return place
 
 
 def probability_at(where: np.ndarray, x: int, y: int, point: np.ndarray) -> float:
     """That of the bead's place nearest to a point (3,), seen from above; in hundredths."""
     p = np.linspace(0.0, 1.0, 101)
-    off = ribbon_points(where, x, y, NEVER + (ALWAYS - NEVER) * p)[:, :2] - point[:2]
+    off = ribbon_points(where, x, y, BEAD_START + (BEAD_END - BEAD_START) * p)[:, :2] - point[:2]
     return round(float(p[np.argmin((off**2).sum(axis=1))]), 2)
 
 
@@ -68,14 +75,14 @@ def token_place(where: np.ndarray, x: int, y: int, s: float) -> np.ndarray:
     start, place, end = ribbon_points(where, x, y, np.array([0.0, s, 1.0]))
     # A ribbon begins and ends a little off the middles of the tiles.
     place = place + (1.0 - s) ** 4 * (where[x] - start) + s**4 * (where[y] - end)
-    hop: np.ndarray = place + REST + [0.0, 0.0, 0.5 * s * (1.0 - s)]
+    hop: np.ndarray = place + TOKEN_OFFSET + [0.0, 0.0, 0.5 * s * (1.0 - s)]
     return hop
 
 
 def ribbon(where: np.ndarray, x: int, y: int, p: float) -> np.ndarray:
     """(2, columns, 3): both edges of the ribbon of probability p, which ends in a head. Its first
     and last columns are points: ribbons laid end to end leave nothing in between."""
-    s = np.concatenate([[0.0], np.linspace(0.0, HEAD, GRAIN), [HEAD, 1.0]])
+    s = np.concatenate([[0.0], np.linspace(0.0, HEAD, RIBBON_POINTS), [HEAD, 1.0]])
     half = np.full(len(s), THIN + WIDE * p)
     half[0] = half[-1] = 0.0
     half[-2] = 2.2 * half[-2] + 0.012

@@ -9,10 +9,10 @@ import numpy as np
 from labs.algorithms.markov_chain import iterate_values
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
-from labs.reinforcement_learning.markov.chains import parse_rows, write_rows
-from labs.reinforcement_learning.markov.description import about_chain, about_value
-from labs.reinforcement_learning.markov.graph import REST, token_place
-from labs.reinforcement_learning.markov.params import NUMBERS, MarkovParams
+from labs.reinforcement_learning.markov.chains import format_rows, parse_rows
+from labs.reinforcement_learning.markov.description import describe_chain, describe_value
+from labs.reinforcement_learning.markov.graph import TOKEN_OFFSET, token_place
+from labs.reinforcement_learning.markov.params import STATE_NUMBERS, MarkovParams
 from labs.reinforcement_learning.markov.picture import draw_chain
 from labs.reinforcement_learning.markov.plots import PLOTS, discount_curves
 from labs.reinforcement_learning.markov.random_walk import (
@@ -24,7 +24,7 @@ from labs.scene import Scene
 
 MAX_SWEEPS, UNENDING_SWEEPS = 1000, 200
 """Iterations of V at most; where V has no limit."""
-WAIT, HURRY = 0.4, 6.0
+REST_SHARE, MAX_ANIMATED_PACE = 0.4, 6.0
 """The part of a step that the token rests; at more steps a second it jumps."""
 
 
@@ -63,9 +63,9 @@ class Markov(Lab[MarkovParams, MarkovState]):
         Handle(
             "tile",
             "A click chooses this state as the one its transitions lead out of.",
-            len(NUMBERS),
+            len(STATE_NUMBERS),
         ),
-        Handle("bead", "The probability of the transition to this state.", len(NUMBERS)),
+        Handle("bead", "The probability of the transition to this state.", len(STATE_NUMBERS)),
     )
 
     def init(self, params: MarkovParams, rng: np.random.Generator) -> MarkovState:
@@ -99,13 +99,17 @@ class Markov(Lab[MarkovParams, MarkovState]):
     ) -> Mapping[str, Value]:
         """A tile chooses its state; a bead is the probability of its ribbon."""
         kind, _, number = handle.partition(" ")
-        if kind == "tile" and number in NUMBERS:
+        if kind == "tile" and number in STATE_NUMBERS:
             return {"source": number}
         process, (x, _) = params.process, params.chosen_states
-        if kind != "bead" or number not in NUMBERS or not process.can_edit(x, int(number) - 1):
+        if (
+            kind != "bead"
+            or number not in STATE_NUMBERS
+            or not process.can_edit(x, int(number) - 1)
+        ):
             return {}
         row = process.row_with_bead_at(x, int(number) - 1, np.array(point))
-        return {"rows": write_rows(parse_rows(params.rows) | {x: row}), "shift": 0.0}
+        return {"rows": format_rows(parse_rows(params.rows) | {x: row}), "shift": 0.0}
 
     def measure(self, params: MarkovParams, state: MarkovState) -> Measurement:
         process, walk, (x, _) = params.process, state.walk, params.chosen_states
@@ -120,7 +124,10 @@ class Markov(Lab[MarkovParams, MarkovState]):
             "visits_off": 50.0 * float(np.abs(visited - far).sum()),
             "step_cost": float(far @ process.C),
         }
-        known = {"second": np.abs(process.eigenvalues[1:2]), "value": found.known[x : x + 1]}
+        known = {
+            "second": np.abs(process.eigenvalues[1:2]),
+            "value": found.values_or_nan[x : x + 1],
+        }
         known = {name: value for name, value in known.items() if np.isfinite(value).any()}
         return measured | {name: float(value[0]) for name, value in known.items()}
 
@@ -133,7 +140,7 @@ class Markov(Lab[MarkovParams, MarkovState]):
             "im": process.eigenvalues.imag,
             "P": process.P,
             "V": state.V,
-            "exact": process.cost_to_go(params.gamma).known,
+            "exact": process.cost_to_go(params.gamma).values_or_nan,
             "sweep": np.arange(len(state.errors), dtype=float),
             "error": state.errors,
             "bound": state.bounds,
@@ -143,8 +150,8 @@ class Markov(Lab[MarkovParams, MarkovState]):
     def notes(self, params: MarkovParams, state: MarkovState) -> Mapping[str, str]:
         process = params.process
         return {
-            "chain": about_chain(process, *params.chosen_states),
-            "value": about_value(process, params.gamma),
+            "chain": describe_chain(process, *params.chosen_states),
+            "value": describe_value(process, params.gamma),
         }
 
     def labels(self, params: MarkovParams) -> Mapping[str, tuple[str, ...]]:
@@ -153,10 +160,10 @@ class Markov(Lab[MarkovParams, MarkovState]):
     def draw(self, scene: Scene, params: MarkovParams, state: MarkovState) -> None:
         process, walk, (source, target) = params.process, state.walk, params.chosen_states
         flow = walk.mu + walk.phase * (walk.next_mu - walk.mu)
-        draw_chain(scene, process, flow, source, process.beads(source, target))
-        token = process.places[walk.at] + REST
-        if walk.phase > WAIT and params.pace < HURRY:
-            part = (walk.phase - WAIT) / (1.0 - WAIT)
+        draw_chain(scene, process, flow, source, process.bead_targets(source, target))
+        token = process.places[walk.at] + TOKEN_OFFSET
+        if walk.phase > REST_SHARE and params.pace < MAX_ANIMATED_PACE:
+            part = (walk.phase - REST_SHARE) / (1.0 - REST_SHARE)
             token = token_place(process.places, walk.at, walk.to, part)
         scene.sphere("walker", token, 0.055, "reference")
         scene.handle("token", token, 0.075)

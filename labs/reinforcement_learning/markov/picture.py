@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from labs.reinforcement_learning.markov.graph import PAD, bead_place, ribbons
+from labs.reinforcement_learning.markov.graph import TILE_SIZE, bead_place, ribbons
 from labs.reinforcement_learning.markov.reward_process import RewardProcess
 from labs.scene import Color, Scene
 
@@ -25,12 +25,12 @@ def draw_chain(
     where, P = process.places, process.P
     tints = np.clip(EMPTY + np.sqrt(mu)[:, None] * (FULL - EMPTY), 0.0, 1.0)
     for x, (place, name) in enumerate(zip(where, process.table.states, strict=True)):
-        corner = place - [PAD / 2, PAD / 2, 0.0]
-        scene.cells(f"tile {x + 1}", corner, PAD, tints[x, None, None])
+        corner = place - [TILE_SIZE / 2, TILE_SIZE / 2, 0.0]
+        scene.cells(f"tile {x + 1}", corner, TILE_SIZE, tints[x, None, None])
         color: Color = "muted" if process.transient[x] else "actual"
         scene.sphere(f"state {x + 1}", place + LOW, 0.045, color)
         scene.label(f"name {x + 1}", f"{x + 1} {name}", place + BELOW)
-    scene.surface("transitions", *_strip(process, source, tuple(beads)))
+    scene.surface("transitions", *_transition_strip(process, source, tuple(beads)))
     for y in beads:
         place = bead_place(where, source, y, P[source, y])
         scene.handle(f"bead {y + 1}", place + LOW, 0.05)
@@ -38,7 +38,7 @@ def draw_chain(
 
 
 @lru_cache(16)
-def _strip(
+def _transition_strip(
     process: RewardProcess, source: int, beads: tuple[int, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points and colours (2, columns, 3) of all ribbons; the same in most frames."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labs.algorithms.markov_chain import mean_costs
+from labs.algorithms.markov_chain import normalized_discounted_costs
 from labs.plots import Bars, Curves, Line, Matrix, Note, Plot, Readout, TimeSeries, Trace
 from labs.reinforcement_learning.markov.reward_process import RewardProcess
 
@@ -71,7 +71,7 @@ PLOTS: tuple[Plot, ...] = (
 def discount_curves(process: RewardProcess, gamma: float) -> dict[str, np.ndarray]:
     """The mean cost of a step over the discount, of every state, and the line at the discount of
     now."""
-    means = mean_costs(process.P, process.C, GAMMAS, process.classes)
+    means = normalized_discounted_costs(process.P, process.C, GAMMAS, process.classes)
     return {
         "gammas": GAMMAS,
         "means": means,

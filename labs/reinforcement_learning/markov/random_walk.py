@@ -40,7 +40,9 @@ class RandomWalk:
 def start_random_walk(P: np.ndarray, start: int, key: int) -> RandomWalk:
     """A walk that has not done a step."""
     there = np.eye(len(P))[start]
-    return RandomWalk(key, start, start, _drawn(key, 0, P[start]), 0, there, there @ P, there)
+    return RandomWalk(
+        key, start, start, _sample_state(key, 0, P[start]), 0, there, there @ P, there
+    )
 
 
 def advance_random_walk(P: np.ndarray, walk: RandomWalk, part: float) -> RandomWalk:
@@ -50,11 +52,11 @@ def advance_random_walk(P: np.ndarray, walk: RandomWalk, part: float) -> RandomW
     while phase >= 1.0:
         at, mu, k, phase = to, mu @ P, k + 1, phase - 1.0
         visits[at] += 1.0
-        to = _drawn(walk.key, k, P[at])
+        to = _sample_state(walk.key, k, P[at])
     return replace(walk, at=at, to=to, steps=k, mu=mu, next_mu=mu @ P, visits=visits, phase=phase)
 
 
-def _drawn(key: int, k: int, row: np.ndarray) -> int:
+def _sample_state(key: int, k: int, row: np.ndarray) -> int:
     """The state that random number k picks by the probabilities in a row (X,)."""
     share = np.random.Generator(np.random.Philox(key=key, counter=k)).random()
     picked = int(np.searchsorted(np.cumsum(row), share, side="right"))

@@ -12,15 +12,19 @@ from labs.algorithms.markov_chain import (
     communicating_classes,
     cost_to_go,
     eigenvalues,
-    long_run,
+    long_run_distribution,
 )
-from labs.reinforcement_learning.markov.chains import shift_probability, with_probability, with_rows
+from labs.reinforcement_learning.markov.chains import (
+    replace_rows,
+    set_probability,
+    shift_probability,
+)
 from labs.reinforcement_learning.markov.graph import probability_at, state_places
 from labs.tasks.mdp_table.table import MdpTable
 
 
 @dataclass(frozen=True)
-class Edit:
+class ChainEdit:
     """Changes to a chain without controls: rows in the place of its own, by the number of the
     state from 0; then one probability shifted. What does not fit changes nothing."""
 
@@ -72,7 +76,7 @@ class RewardProcess:
         values: np.ndarray = self.table.C + gamma * (self.table.P @ V).T
         return values
 
-    def beads(self, x: int, y: int) -> list[int]:
+    def bead_targets(self, x: int, y: int) -> list[int]:
         """The states to which beads lead from x: where it goes, and y; none where x, or any of
         its probabilities, cannot be edited."""
         if not self.can_edit(x):
@@ -84,10 +88,10 @@ class RewardProcess:
     def row_with_bead_at(self, x: int, y: int, point: np.ndarray) -> np.ndarray:
         """(X,): row x with its probability of y where a bead dragged to `point` (3,) [m] says."""
         p = probability_at(self.places, x, y, point)
-        return with_probability(self.P[x], y, p, self.unedited[x])
+        return set_probability(self.P[x], y, p, self.unedited[x])
 
 
-def reward_process(table: MdpTable, first: float, edit: Edit) -> RewardProcess:
+def reward_process(table: MdpTable, first: float, edit: ChainEdit) -> RewardProcess:
     """Of the policy that in every state takes the first control with this probability; the
     others share what is left."""
     X, U = table.C.shape
@@ -96,10 +100,12 @@ def reward_process(table: MdpTable, first: float, edit: Edit) -> RewardProcess:
     mdp = table.mdp(1.0)
     P = own = mdp.transition_matrix(policy)
     if U == 1:
-        P = with_rows(own, edit.rows)
+        P = replace_rows(own, edit.rows)
         x, y = edit.source, edit.target
         if max(x, y) < X and edit.shift != 0.0:
-            P[x] = with_probability(P[x], y, shift_probability(P[x, y], edit.shift), own[x])
+            P[x] = set_probability(P[x], y, shift_probability(P[x, y], edit.shift), own[x])
     classes = communicating_classes(P)
     C = mdp.policy_cost(policy)
-    return RewardProcess(table, policy, own, P, C, classes, long_run(P, classes), state_places(X))
+    return RewardProcess(
+        table, policy, own, P, C, classes, long_run_distribution(P, classes), state_places(X)
+    )

@@ -20,9 +20,9 @@ import numpy as np
 
 from labs.algorithms.batch_prediction import (
     Batch,
-    batch_of,
+    batch_from_episodes,
     certainty_equivalence,
-    collect,
+    collect_episodes,
     empty_batch,
     least_squares,
     monte_carlo_sweep,
@@ -30,13 +30,13 @@ from labs.algorithms.batch_prediction import (
 )
 from labs.arrays import Training
 from labs.lab import Snapshot
-from labs.number_texts import counted
+from labs.number_texts import count_text
 from labs.problems.prediction import root_mean_square_error
 from labs.reinforcement_learning.prediction.params import PredictionParams
 from labs.reinforcement_learning.prediction.worlds import LEARNERS
 
 A, B, GAIN = 1, 2, 3
-EPISODES = (
+PREDICTOR_EPISODES = (
     ([A, B, 0], [0.0, 0.0]),
     *[([B, GAIN], [-1.0])] * 6,
     ([B, 0], [0.0]),
@@ -44,11 +44,11 @@ EPISODES = (
 """States and costs. Sutton and Barto, example 6.4, its rewards as negative costs."""
 ROUNDING = 1e-12
 """What is smaller is no misfit."""
-ITERATIONS, CLOSE = 100, 1e-6
+ITERATIONS, TOLERANCE = 100, 1e-6
 """Of the sweeps at most, and how near to the answers they stop."""
 
 
-def start(params: PredictionParams, rng: np.random.Generator) -> Training:
+def initial_training(params: PredictionParams, rng: np.random.Generator) -> Training:
     """No episode yet."""
     given = params.data == "predictor"
     X, many = params.place.states + 2, 1 if given else LEARNERS
@@ -70,19 +70,19 @@ def start(params: PredictionParams, rng: np.random.Generator) -> Training:
 
 def learn(params: PredictionParams, training: Training) -> Iterator[Snapshot]:
     """The batch grows, then it is learned from, from the first guess on."""
-    found = dict(start(params, np.random.default_rng(0))) | {"seed": training["seed"]}
+    found = dict(initial_training(params, np.random.default_rng(0))) | {"seed": training["seed"]}
     first, i = found["V"][0], 0
     batch = empty_batch(first.shape[1], len(first), np.random.default_rng(int(training["seed"])))
     given = params.data == "predictor"
-    size = len(EPISODES) if given else round(params.size)
+    size = len(PREDICTOR_EPISODES) if given else round(params.size)
     for i in range(1, size + 1):
-        more = batch_of(EPISODES[:i], first.shape[1], 1.0)
-        batch = more if given else collect(params.prediction.task, batch, 1)
-        found |= _grown(params, found, batch, first, i)
+        more = batch_from_episodes(PREDICTOR_EPISODES[:i], first.shape[1], 1.0)
+        batch = more if given else collect_episodes(params.prediction.task, batch, 1)
+        found |= _batch_answers(params, found, batch, first, i)
         yield Snapshot(i, dict(found), "", 0.5 * i / size)
     alpha, stride = 1.0 / batch.visits.max(), 1 if given else 20
     sweeps, worst = 0, np.inf
-    while worst > CLOSE and sweeps < ITERATIONS * stride:
+    while worst > TOLERANCE and sweeps < ITERATIONS * stride:
         V = found["V"]
         for _ in range(stride):
             V = np.stack([monte_carlo_sweep(batch, V[0], alpha), td_sweep(batch, V[1], 1.0, alpha)])
@@ -94,10 +94,10 @@ def learn(params: PredictionParams, training: Training) -> Iterator[Snapshot]:
             "sweeps": np.append(found["sweeps"], float(sweeps)),
             "left": np.concatenate([found["left"], left[:, None]], axis=1),
         }
-        found |= _judged(batch, V, first)
-        done, spent = "", counted(sweeps, "sweep")
-        if worst <= CLOSE:
-            done = f"Both settled after {spent} over {counted(size, 'episode')}."
+        found |= _fit_errors(batch, V, first)
+        done, spent = "", count_text(sweeps, "sweep")
+        if worst <= TOLERANCE:
+            done = f"Both settled after {spent} over {count_text(size, 'episode')}."
         elif sweeps >= ITERATIONS * stride:
             done = f"After {spent} they are still up to {worst:.2g} from their answers."
         yield Snapshot(
@@ -105,11 +105,11 @@ def learn(params: PredictionParams, training: Training) -> Iterator[Snapshot]:
         )
 
 
-def _grown(
+def _batch_answers(
     params: PredictionParams, found: Training, batch: Batch, first: np.ndarray, size: int
 ) -> dict[str, np.ndarray]:
     answers = np.stack([least_squares(batch, first), certainty_equivalence(batch, first, 1.0)])
-    grown = {"answers": answers} | _judged(batch, found["V"], first)
+    grown = {"answers": answers} | _fit_errors(batch, found["V"], first)
     if params.data != "predictor":
         task = params.prediction.task
         error = np.array([root_mean_square_error(task, V).mean() for V in answers])
@@ -118,7 +118,7 @@ def _grown(
     return grown
 
 
-def _judged(batch: Batch, V: np.ndarray, first: np.ndarray) -> dict[str, np.ndarray]:
+def _fit_errors(batch: Batch, V: np.ndarray, first: np.ndarray) -> dict[str, np.ndarray]:
     """How V (2, S, X) fits what was seen, and how consistent it is."""
     weight = batch.visits / batch.visits.sum()
     seen = np.maximum(batch.visits, 1.0)

@@ -29,16 +29,16 @@ from labs.problems.finite_mdp import FiniteMDP
 from labs.reinforcement_learning.prediction import online
 from labs.reinforcement_learning.prediction.params import PredictionParams
 
-CORNERS = ("Exhaustive search", "Dynamic programming", "Monte Carlo", "TD(0)")
-DEEPEST = 14
+UPDATE_KINDS = ("Exhaustive search", "Dynamic programming", "Monte Carlo", "TD(0)")
+MAX_DEPTH = 14
 """Steps of the paths of exhaustive search at most: 2^14 paths from each state."""
 TOLERANCE = 1e-3
 """A sweep of dynamic programming that changes no value by more is the last one."""
 
 
-def start(params: PredictionParams, rng: np.random.Generator) -> Training:
+def initial_training(params: PredictionParams, rng: np.random.Generator) -> Training:
     """Nothing looked at yet."""
-    sampled = online.start(params, rng)
+    sampled = online.initial_training(params, rng)
     V = sampled["V"]
     return {
         "V": np.concatenate([np.zeros_like(V[:1]), V[:1], V]),
@@ -53,13 +53,16 @@ def start(params: PredictionParams, rng: np.random.Generator) -> Training:
 def learn(params: PredictionParams, training: Training) -> Iterator[Snapshot]:
     """From the first guess on: a level deeper, a sweep, and some episodes an iteration."""
     world, mdp = params.prediction, params.prediction.mdp
-    begun = start(params, np.random.default_rng(0))
-    sampled = {**online.start(params, np.random.default_rng(0)), "random": training["random"]}
+    begun = initial_training(params, np.random.default_rng(0))
+    sampled = {
+        **online.initial_training(params, np.random.default_rng(0)),
+        "random": training["random"],
+    }
     tree, swept = ExhaustiveSearch(mdp, world.policy), begun["V"][1, 0]
     looked, error, samples = begun["looked"], begun["error"], begun["samples"]
     counts, change = np.zeros(4), np.inf
     for i, batch in enumerate(online.learn(params, sampled), 1):
-        if i <= DEEPEST:
+        if i <= MAX_DEPTH:
             tree.deepen()
             counts[0] += tree.looked
         if change > TOLERANCE:
@@ -68,7 +71,7 @@ def learn(params: PredictionParams, training: Training) -> Iterator[Snapshot]:
         counts[2:] = batch.data["steps"]
         known = np.broadcast_to(np.stack([tree.values, swept])[:, None], batch.data["V"].shape)
         V = np.concatenate([known, batch.data["V"]])
-        errors = [online.decomposition(world, each)[0] for each in V]
+        errors = [online.error_decomposition(world, each)[0] for each in V]
         looked = np.concatenate([looked, counts[:, None]], axis=1)
         error = np.concatenate([error, np.array(errors)[:, None]], axis=1)
         samples = batch.data["episodes"]

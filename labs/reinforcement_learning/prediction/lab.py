@@ -8,30 +8,38 @@ import numpy as np
 
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
-from labs.random_numbers import seeded
+from labs.random_numbers import random_states
 from labs.reinforcement_learning.prediction import batch, corners, online
-from labs.reinforcement_learning.prediction.live import Live, advance, begin
+from labs.reinforcement_learning.prediction.live_learner import (
+    LiveLearner,
+    advance_live_learner,
+    start_live_learner,
+)
 from labs.reinforcement_learning.prediction.params import PREDICTION_METHODS, PredictionParams
 from labs.reinforcement_learning.prediction.picture import (
     clicked_state,
+    draw_backup_diagrams,
     draw_batch,
-    draw_corners,
     draw_world,
 )
 from labs.reinforcement_learning.prediction.plots import (
     PLOTS,
     batch_curves,
-    corner_curves,
     error_curves,
     error_maps,
     estimate_curves,
     target_curves,
+    update_curves,
 )
 from labs.scene import Scene
 from labs.tasks.grid_world.picture import BOARD
 from labs.tasks.random_walk.picture import ROW
 
-START = {"online": online.start, "batch": batch.start, "corners": corners.start}
+INITIAL_TRAINING = {
+    "online": online.initial_training,
+    "batch": batch.initial_training,
+    "corners": corners.initial_training,
+}
 LEARN = {"online": online.learn, "batch": batch.learn, "corners": corners.learn}
 
 
@@ -41,7 +49,7 @@ class PredictionState(State):
 
     training: Mapping[str, np.ndarray]
     """Of the study (`online`, `batch` or `corners`)."""
-    live: Live
+    live: LiveLearner
     random: np.ndarray
     """(4,) uint64: of the targets that are sampled to be looked at."""
 
@@ -83,10 +91,10 @@ class PredictionLab(Lab[PredictionParams, PredictionState]):
     )
 
     def init(self, params: PredictionParams, rng: np.random.Generator) -> PredictionState:
-        random = seeded(rng, 2)
+        random = random_states(rng, 2)
         return PredictionState(
-            training=START[params.study](params, rng),
-            live=begin(params.prediction, random[0], params.v0),
+            training=INITIAL_TRAINING[params.study](params, rng),
+            live=start_live_learner(params.prediction, random[0], params.v0),
             random=random[1],
         )
 
@@ -97,7 +105,7 @@ class PredictionLab(Lab[PredictionParams, PredictionState]):
         live = state.live
         if params.study != "batch":
             part, first = params.pace * self.period, params.visits == "first"
-            live = advance(params.prediction, params.rules, first, live, part)
+            live = advance_live_learner(params.prediction, params.rules, first, live, part)
         return replace(state, t=state.t + self.period, live=live)
 
     def solve(self, params: PredictionParams, state: PredictionState) -> Iterator[Snapshot]:
@@ -120,12 +128,18 @@ class PredictionLab(Lab[PredictionParams, PredictionState]):
     def measure(self, params: PredictionParams, state: PredictionState) -> Measurement:
         training = state.training
         if params.study == "corners":
-            return _last({"error": training["error"], "looked": training["looked"]}, range(4))
+            return _latest_values(
+                {"error": training["error"], "looked": training["looked"]}, range(4)
+            )
         if params.study == "batch":
-            measured = _last({"misfit": training["misfit"][:, None]}, PREDICTION_METHODS)
-            measured |= _last({"residual": training["residual"][:, None]}, PREDICTION_METHODS)
+            measured = _latest_values({"misfit": training["misfit"][:, None]}, PREDICTION_METHODS)
+            measured |= _latest_values(
+                {"residual": training["residual"][:, None]}, PREDICTION_METHODS
+            )
             if params.data == "predictor":
-                measured |= _last({"V_A": training["V"][:, 0, batch.A, None]}, PREDICTION_METHODS)
+                measured |= _latest_values(
+                    {"V_A": training["V"][:, 0, batch.A, None]}, PREDICTION_METHODS
+                )
             return measured
         x = params.looked_at
         return {
@@ -134,16 +148,16 @@ class PredictionLab(Lab[PredictionParams, PredictionState]):
             "walker_mc": float(state.live.V[0, x]),
             "walker_td": float(state.live.V[1, x]),
             "walker_true": float(params.prediction.truth[x]),
-        } | _last({name: training[name] for name in online.CURVES}, PREDICTION_METHODS)
+        } | _latest_values({name: training[name] for name in online.CURVES}, PREDICTION_METHODS)
 
     def fields(self, params: PredictionParams, state: PredictionState) -> Mapping[str, np.ndarray]:
         training, world = state.training, params.prediction
         if params.study == "corners":
-            return corner_curves(training, world.truth)
+            return update_curves(training, world.truth)
         if params.study == "batch":
             truth = None if params.data == "predictor" else world.truth
             return batch_curves(training, truth)
-        V, spread = _shown(params, state)
+        V, spread = _shown_values(params, state)
         return {
             **error_curves(training),
             **estimate_curves(world, V, spread),
@@ -163,12 +177,12 @@ class PredictionLab(Lab[PredictionParams, PredictionState]):
     def draw(self, scene: Scene, params: PredictionParams, state: PredictionState) -> None:
         world = params.prediction
         if params.study == "corners":
-            draw_corners(scene, world, state.live, state.training["V"].mean(axis=1))
+            draw_backup_diagrams(scene, world, state.live, state.training["V"].mean(axis=1))
         elif params.study == "batch":
             truth = None if params.data == "predictor" else world.truth
             draw_batch(scene, params.place, state.training["V"][:, 0], truth)
         else:
-            shown = _shown(params, state)
+            shown = _shown_values(params, state)
             draw_world(scene, world, state.live, *shown, params.method, params.looked_at)
 
     @classmethod
@@ -188,7 +202,7 @@ class PredictionLab(Lab[PredictionParams, PredictionState]):
                 state = lab.step(params, Inputs(), state)
 
 
-def _shown(
+def _shown_values(
     params: PredictionParams, state: PredictionState
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """V (2, X) of the walker; or the mean of all learners, and their standard deviation."""
@@ -198,7 +212,7 @@ def _shown(
     return V.mean(axis=1), V.std(axis=1)
 
 
-def _last(curves: Mapping[str, np.ndarray], names: Iterable[object]) -> dict[str, float]:
+def _latest_values(curves: Mapping[str, np.ndarray], names: Iterable[object]) -> dict[str, float]:
     """The last of each curve (n, k), if there is any, of each of the names."""
     return {
         f"{name}_{which}": float(curve[m, -1])

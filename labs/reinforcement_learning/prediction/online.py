@@ -18,20 +18,20 @@ import numpy as np
 from labs.algorithms.prediction import EVERY_VISIT, FIRST_VISIT, TD0, Predictors, init, step
 from labs.arrays import Training
 from labs.lab import Snapshot
-from labs.number_texts import counted
+from labs.number_texts import count_text
 from labs.reinforcement_learning.prediction.params import PredictionParams
 from labs.reinforcement_learning.prediction.worlds import PredictionWorld
 
 CURVES = ("error", "bias", "spread")
 BATCHES = 100
 """Iterations of a training, or more while its episodes are long."""
-STEPS = 200_000
+BATCH_TRANSITIONS = 200_000
 """Transitions of a batch, about: some milliseconds."""
-KEPT = 1000
+HISTORY_LENGTH = 1000
 """Batches whose curves are kept; older ones are dropped."""
 
 
-def start(params: PredictionParams, rng: np.random.Generator) -> Training:
+def initial_training(params: PredictionParams, rng: np.random.Generator) -> Training:
     """Nothing learned yet: V = V_0 everywhere."""
     world = params.prediction
     learners = init(world.task, world.learners, rng, params.v0)
@@ -53,7 +53,9 @@ def learn(params: PredictionParams, training: Training) -> Iterator[Snapshot]:
         batch = min(batch, wanted - learned)
         training, i, learned = _train(params, training, batch), i + 1, learned + batch
         done = (
-            f"{counted(episodes_done(training), 'episode')} learned." if learned == wanted else ""
+            f"{count_text(episodes_done(training), 'episode')} learned."
+            if learned == wanted
+            else ""
         )
         yield Snapshot(i, training, done, learned / wanted)
 
@@ -63,7 +65,7 @@ def episodes_done(training: Training) -> int:
     return int(training["episodes"][-1]) if len(training["episodes"]) else 0
 
 
-def decomposition(world: PredictionWorld, V: np.ndarray) -> tuple[float, float, float]:
+def error_decomposition(world: PredictionWorld, V: np.ndarray) -> tuple[float, float, float]:
     """Error, bias and spread of V (S, X)."""
     off = V - world.truth
     bias = float(off.mean(axis=0) ** 2 @ world.task.weight)
@@ -78,7 +80,7 @@ def _train(params: PredictionParams, training: Training, episodes: int) -> Train
         step(world.task, rule, method, _learners(training, m), episodes)
         for m, (method, rule) in enumerate(zip(methods, params.rules, strict=True))
     ]
-    parts = np.array([decomposition(world, learners.V) for learners in after])
+    parts = np.array([error_decomposition(world, learners.V) for learners in after])
     done = float(episodes_done(training) + episodes)
     return {
         "V": np.stack([learners.V for learners in after]),
@@ -86,9 +88,9 @@ def _train(params: PredictionParams, training: Training, episodes: int) -> Train
         "random": np.stack([learners.random for learners in after]),
         "lengths": np.array(after[1].lengths.mean()),
         "steps": training["steps"] + episodes * after[1].lengths.mean(),
-        "episodes": np.append(training["episodes"], done)[-KEPT:],
+        "episodes": np.append(training["episodes"], done)[-HISTORY_LENGTH:],
     } | {
-        name: np.concatenate([training[name], part[:, None]], axis=1)[:, -KEPT:]
+        name: np.concatenate([training[name], part[:, None]], axis=1)[:, -HISTORY_LENGTH:]
         for name, part in zip(CURVES, parts.T, strict=True)
     }
 
@@ -102,4 +104,4 @@ def _learners(training: Training, method: int) -> Predictors:
 def _batch_size(params: PredictionParams, training: Training, most: int) -> int:
     """Transitions are counted, not seconds: all machines do the same."""
     length = float(training["lengths"]) or 100.0
-    return int(np.clip(STEPS / (2.0 * params.prediction.learners * length), 1, most))
+    return int(np.clip(BATCH_TRANSITIONS / (2.0 * params.prediction.learners * length), 1, most))

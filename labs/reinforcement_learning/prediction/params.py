@@ -5,14 +5,14 @@ from labs.problems.episodes import UpdateRule
 from labs.reinforcement_learning.prediction.worlds import (
     LARGEST_GAMMA,
     PredictionWorld,
-    grid,
-    pendulum,
-    walk,
+    grid_prediction,
+    pendulum_prediction,
+    walk_prediction,
 )
-from labs.tasks.random_walk.walks import FIVE, NINETEEN, WalkShape
+from labs.tasks.random_walk.walks import FIVE_STATE_WALK, NINETEEN_STATE_WALK, WalkShape
 
 PREDICTION_METHODS = {"mc": "Monte Carlo", "td": "TD(0)"}
-WALKS = {"five": FIVE, "nineteen": NINETEEN}
+WALKS = {"five": FIVE_STATE_WALK, "nineteen": NINETEEN_STATE_WALK}
 PREDICTOR = WalkShape(2, 0.0, -1.0)
 """What the two states of eight given episodes are drawn on."""
 
@@ -128,18 +128,22 @@ class PredictionParams(Params):
     @property
     def place(self) -> WalkShape:
         """The walk of a batch."""
-        return WALKS.get(self.data, PREDICTOR) if self.study == "batch" else FIVE
+        return WALKS.get(self.data, PREDICTOR) if self.study == "batch" else FIVE_STATE_WALK
 
     @property
     def prediction(self) -> PredictionWorld:
         """Whose value is learned."""
         if self.study == "batch":
-            return walk(WALKS.get(self.data, FIVE), 1.0)
+            return walk_prediction(WALKS.get(self.data, FIVE_STATE_WALK), 1.0)
         if self.study == "corners":
-            return walk(FIVE, self.gamma)
+            return walk_prediction(FIVE_STATE_WALK, self.gamma)
         if self.world == "pendulum":
-            return pendulum(min(self.gamma, LARGEST_GAMMA), self.noise, self.ends)
-        return grid(self.gamma) if self.world == "grid" else walk(WALKS[self.world], self.gamma)
+            return pendulum_prediction(min(self.gamma, LARGEST_GAMMA), self.noise, self.ends)
+        return (
+            grid_prediction(self.gamma)
+            if self.world == "grid"
+            else walk_prediction(WALKS[self.world], self.gamma)
+        )
 
     @property
     def rules(self) -> tuple[UpdateRule, UpdateRule]:

@@ -3,8 +3,8 @@ or the four kinds of update as diagrams, from where the walker is."""
 
 import numpy as np
 
-from labs.reinforcement_learning.prediction.corners import CORNERS
-from labs.reinforcement_learning.prediction.live import Live
+from labs.reinforcement_learning.prediction.corners import UPDATE_KINDS
+from labs.reinforcement_learning.prediction.live_learner import LiveLearner
 from labs.reinforcement_learning.prediction.params import PREDICTION_METHODS
 from labs.reinforcement_learning.prediction.worlds import PredictionWorld
 from labs.scene import Scene
@@ -24,7 +24,7 @@ from labs.tasks.random_walk.picture import (
 )
 from labs.tasks.random_walk.walks import WalkShape
 
-LOOKED_AT = (0.62, 0.70, 0.86)
+SELECTED_COLOR = (0.62, 0.70, 0.86)
 """sRGB of its cell on a walk."""
 MOVE = 1000
 """Parts that a step on the grid is drawn in."""
@@ -49,7 +49,7 @@ TABLE = {
 def draw_world(
     scene: Scene,
     world: PredictionWorld,
-    live: Live,
+    live: LiveLearner,
     V: np.ndarray,
     spread: np.ndarray | None,
     method: str,
@@ -63,7 +63,7 @@ def draw_world(
     match world.place:
         case WalkShape():
             colors = np.tile(INSIDE, (world.place.states, 1))
-            colors[looked_at - 1] = LOOKED_AT
+            colors[looked_at - 1] = SELECTED_COLOR
             draw_walk(
                 scene, world.place, float((1.0 - part) * x + part * y), colors, clickable=True
             )
@@ -88,7 +88,15 @@ def draw_world(
         case PendulumGrid():
             high = max(float(world.truth.max()), 1e-3)
             names = (PREDICTION_METHODS[method],)
-            draw_table(scene, world.place, V[shown], high, None, _swing(world, live, part), names)
+            draw_table(
+                scene,
+                world.place,
+                V[shown],
+                high,
+                None,
+                _interpolate_swing(world, live, part),
+                names,
+            )
 
 
 def clicked_state(
@@ -105,7 +113,7 @@ def clicked_state(
     return None if x is None or world.mdp.terminal[x] else x
 
 
-def _swing(world: PredictionWorld, live: Live, part: float) -> Swing:
+def _interpolate_swing(world: PredictionWorld, live: LiveLearner, part: float) -> Swing:
     """The pendulum on its way from node to node, the short way round."""
     grid = world.place
     assert isinstance(grid, PendulumGrid)
@@ -123,7 +131,9 @@ def draw_batch(scene: Scene, place: WalkShape, V: np.ndarray, truth: np.ndarray 
     draw_values(scene, place, list(V), truth)
 
 
-def draw_corners(scene: Scene, world: PredictionWorld, live: Live, V: np.ndarray) -> None:
+def draw_backup_diagrams(
+    scene: Scene, world: PredictionWorld, live: LiveLearner, V: np.ndarray
+) -> None:
     """The four updates, bootstrapping to the right, sampling below: on the left of the state where
     the walker's episode began, on the right of the one where it has just been, with what V (4, X)
     says of it. Time runs downwards. Lines are the transitions looked at, magenta dots ends of an
@@ -135,7 +145,7 @@ def draw_corners(scene: Scene, world: PredictionWorld, live: Live, V: np.ndarray
     path = live.states[: max(done, 2)]
     x, y = (path[0], path[1]) if len(path) == 2 else path[-2:]
     root = int(path[0])
-    tree = _paths(root, end)
+    tree = _path_edges(root, end)
     either = np.array([[[x, 0], [x - 1, 1]], [[x, 0], [x + 1, 1]]])
     walked = np.stack([path, np.arange(len(path))], axis=1)
     edges = (
@@ -144,9 +154,9 @@ def draw_corners(scene: Scene, world: PredictionWorld, live: Live, V: np.ndarray
         np.stack([walked[:-1], walked[1:]], axis=1),
         np.array([[[x, 0], [y, 1]]]),
     )
-    for c, (name, seen) in enumerate(zip(CORNERS, edges, strict=True)):
+    for c, (name, seen) in enumerate(zip(UPDATE_KINDS, edges, strict=True)):
         corner = np.array([(c % 2 - 0.5) * APART[0], 0.0, (0.5 - c // 2) * APART[1] + 0.7])
-        _draw_diagram(scene, name, corner, seen.astype(float), end, bootstraps=c % 2 == 1)
+        _draw_backup_diagram(scene, name, corner, seen.astype(float), end, bootstraps=c % 2 == 1)
         of = int(x) if c % 2 else root
         text = f"{name}: V({state_names(place)[of - 1]}) = {V[c, of]:.2f}"
         scene.label(name, text, corner + np.array([0.0, 0.0, 0.1]))
@@ -155,7 +165,7 @@ def draw_corners(scene: Scene, world: PredictionWorld, live: Live, V: np.ndarray
     scene.camera((0.0, -3.0, 0.7), (0.0, 0.0, 0.6))
 
 
-def _paths(x: int, end: int) -> np.ndarray:
+def _path_edges(x: int, end: int) -> np.ndarray:
     """(m, 2, 2): from (state, level) to (state, level), all steps that paths from x may take."""
     edges, here = [], {x}
     for level in range(LEVELS):
@@ -164,7 +174,7 @@ def _paths(x: int, end: int) -> np.ndarray:
     return np.array(edges)
 
 
-def _draw_diagram(
+def _draw_backup_diagram(
     scene: Scene, name: str, corner: np.ndarray, edges: np.ndarray, end: int, *, bootstraps: bool
 ) -> None:
     """Edges (m, 2, 2) under a name; `corner` is the middle of the top."""

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from labs.plots import Curves, HeatMap, Line, Plot, Readout, TimeSeries, Trace
-from labs.reinforcement_learning.prediction.corners import CORNERS
+from labs.reinforcement_learning.prediction.corners import UPDATE_KINDS
 from labs.reinforcement_learning.prediction.params import PREDICTION_METHODS
 from labs.reinforcement_learning.prediction.targets import sample_targets
 from labs.reinforcement_learning.prediction.worlds import PredictionWorld
@@ -22,7 +22,7 @@ CORNER = {"study": ("corners",)}
 MAP_AXES = ("{across}", "{up}")
 
 
-def _both(
+def _method_traces(
     x: str, y: str, what: str = "", style: Literal["line", "dash"] = "line"
 ) -> tuple[Trace, ...]:
     """A curve of each method."""
@@ -40,13 +40,13 @@ def _readouts(channel: str, label: str, when: Mapping[str, tuple[str, ...]]) -> 
 
 
 PLOTS: tuple[Plot, ...] = (
-    Curves("RMS error", "episodes", "error", *_both("episodes", "error"), when=ONLINE),
+    Curves("RMS error", "episodes", "error", *_method_traces("episodes", "error"), when=ONLINE),
     Curves(
         "Estimates and truth",
         "{axis}",
         "V",
         Trace("along", "true_V", "truth", "points"),
-        *_both("along", "estimate"),
+        *_method_traces("along", "estimate"),
         *(
             Trace("beside", f"{edge}_{short}", "", "dash", i, optional=True)
             for i, short in enumerate(PREDICTION_METHODS, 1)
@@ -58,8 +58,8 @@ PLOTS: tuple[Plot, ...] = (
         "Bias and spread",
         "episodes",
         "RMS over states",
-        *_both("episodes", "bias", ": bias"),
-        *_both("episodes", "spread", ": spread", "dash"),
+        *_method_traces("episodes", "bias", ": bias"),
+        *_method_traces("episodes", "spread", ": spread", "dash"),
         when=ONLINE,
     ),
     Curves(
@@ -85,7 +85,7 @@ PLOTS: tuple[Plot, ...] = (
         "Two answers of one batch",
         "state",
         "V",
-        *_both("cells", "batch"),
+        *_method_traces("cells", "batch"),
         Trace("cells", "least_squares", "least squares", "points", 1),
         Trace("cells", "certainty", "certainty equivalence", "points", 2),
         Trace("batch_cells", "batch_truth", "truth", "dash", optional=True),
@@ -95,14 +95,14 @@ PLOTS: tuple[Plot, ...] = (
         "Error over the size of the batch",
         "episodes",
         "error",
-        *_both("sizes", "answer"),
+        *_method_traces("sizes", "answer"),
         when=WALKED,
     ),
     Curves(
         "Distance from the answer",
         "sweeps",
         "largest distance",
-        *_both("sweeps", "left"),
+        *_method_traces("sweeps", "left"),
         log_y=True,
         when=BATCH,
     ),
@@ -110,7 +110,7 @@ PLOTS: tuple[Plot, ...] = (
         "Error over transitions looked at",
         "transitions",
         "RMS error",
-        Trace("looked", "corner_error", CORNERS, series=1),
+        Trace("looked", "corner_error", UPDATE_KINDS, series=1),
         log_x=True,
         log_y=True,
         when=CORNER,
@@ -120,7 +120,7 @@ PLOTS: tuple[Plot, ...] = (
         "state",
         "V",
         Trace("corner_cells", "corner_truth", "truth", "points"),
-        Trace("corner_cells", "corner_V", CORNERS, series=1),
+        Trace("corner_cells", "corner_V", UPDATE_KINDS, series=1),
         when=CORNER,
     ),
     Readout("trained", "Episodes of each learner", "", whole=True, when=ONLINE),
@@ -131,10 +131,10 @@ PLOTS: tuple[Plot, ...] = (
     *_readouts("V_A", "V(A)", GIVEN),
     *_readouts("misfit", "Misfit of what was paid", BATCH),
     *_readouts("residual", "Bellman error in the model", BATCH),
-    *(Readout(f"error_{i}", f"Error, {c}", "", when=CORNER) for i, c in enumerate(CORNERS)),
+    *(Readout(f"error_{i}", f"Error, {c}", "", when=CORNER) for i, c in enumerate(UPDATE_KINDS)),
     *(
         Readout(f"looked_{i}", f"Transitions, {c}", "", whole=True, when=CORNER)
-        for i, c in enumerate(CORNERS)
+        for i, c in enumerate(UPDATE_KINDS)
     ),
 )
 
@@ -155,11 +155,11 @@ def estimate_curves(
     """V (2, X) and the truth over some states, and the standard deviation (2, X), if given, as two
     lines beside."""
     some = world.states
-    found = {"along": world.across, "true_V": world.truth[some]}
+    found = {"along": world.axis_positions, "true_V": world.truth[some]}
     for m, short in enumerate(PREDICTION_METHODS):
         found[f"estimate_{short}"] = V[m, some]
         if spread is not None:
-            found["beside"] = world.across
+            found["beside"] = world.axis_positions
             found[f"low_{short}"] = (V - spread)[m, some]
             found[f"high_{short}"] = (V + spread)[m, some]
     return found
@@ -219,7 +219,7 @@ def batch_curves(
     return found
 
 
-def corner_curves(training: Mapping[str, np.ndarray], truth: np.ndarray) -> dict[str, np.ndarray]:
+def update_curves(training: Mapping[str, np.ndarray], truth: np.ndarray) -> dict[str, np.ndarray]:
     """Of the four kinds of update."""
     inner = slice(1, -1)
     return {

@@ -10,11 +10,11 @@ from labs.algorithms.temporal_difference import n_step_return
 from labs.compiled import compiled
 from labs.problems.prediction import PredictionTask, empty_episode, sample_episode
 
-EPISODES = 1000
+TARGET_EPISODES = 1000
 
 
 def sample_targets(
-    task: PredictionTask, x: int, V: np.ndarray, random: np.ndarray, many: int = EPISODES
+    task: PredictionTask, x: int, V: np.ndarray, random: np.ndarray, many: int = TARGET_EPISODES
 ) -> np.ndarray:
     """(2, k): of both methods, from up to `many` episodes that start in x: Monte Carlo has none
     where an episode was cut, NaN. `random` (4,) uint64 stays as it is."""

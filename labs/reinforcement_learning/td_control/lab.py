@@ -8,9 +8,9 @@ import numpy as np
 
 from labs.arrays import Training
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
-from labs.number_texts import counted
+from labs.number_texts import count_text
 from labs.params import Value
-from labs.random_numbers import seeded, uniform
+from labs.random_numbers import random_states, uniform
 from labs.reinforcement_learning.td_control.greedy_walk import (
     PERIOD,
     follow_greedy_policies,
@@ -31,18 +31,23 @@ from labs.scene import Scene
 from labs.tasks.grid_world.cells import CellWorld
 from labs.tasks.grid_world.map import MAPS, GridWorld, grid_world
 from labs.tasks.grid_world.params import BOOK_WORLDS, edit_map
-from labs.tasks.grid_world.picture import draw_board, draw_walkers, draw_way, value_span
+from labs.tasks.grid_world.picture import draw_board, draw_path, draw_walkers, value_span
 from labs.tasks.grid_world.walk import GridWalk, nominal_path
-from labs.tasks.mdp_table.params import TABLES
+from labs.tasks.mdp_table.params import EXAMPLE_TABLES
 from labs.tasks.mdp_table.picture import draw_states
-from labs.tasks.mdp_table.world import UNNAMED, TableWorld
+from labs.tasks.mdp_table.world import NO_NAMES_NOTE, TableWorld
 from labs.tasks.pendulum_table.picture import draw_table
 from labs.tasks.pendulum_table.swing import Swing
 from labs.tasks.pendulum_table.table import PendulumGrid
 
-ICE: Mapping[str, Value] = {"alpha": 1.0, "omega": 0.6, "epsilon": 0.3, "episodes": 2000.0}
+SLIPPERY_SETTINGS: Mapping[str, Value] = {
+    "alpha": 1.0,
+    "omega": 0.6,
+    "epsilon": 0.3,
+    "episodes": 2000.0,
+}
 """How to learn where much is left to chance: with steps that decrease."""
-OPTIMAL = 1e-9
+OPTIMALITY_TOLERANCE = 1e-9
 """A greedy walk that costs this much more than the best at most is one of the best."""
 
 
@@ -73,14 +78,14 @@ class TdControl(Lab[TdParams, TdState]):
         "Cliff": {},
         "Windy grid": {"map": MAPS["windy"], "episodes": 1000},
         "Room": {"map": MAPS["room"], "episodes": 250},
-        "FrozenLake": {**BOOK_WORLDS["FrozenLake"], **ICE},
-        "4 x 3 world": {**BOOK_WORLDS["4 x 3 world"], **ICE},
+        "FrozenLake": {**BOOK_WORLDS["FrozenLake"], **SLIPPERY_SETTINGS},
+        "4 x 3 world": {**BOOK_WORLDS["4 x 3 world"], **SLIPPERY_SETTINGS},
         "Taxicab": {
             "system": "table",
-            "table": TABLES["Taxicab"],
+            "table": EXAMPLE_TABLES["Taxicab"],
             "gamma": 0.9,
             "anywhere": True,
-            **ICE,
+            **SLIPPERY_SETTINGS,
         },
         "Pendulum": {
             "system": "pendulum",
@@ -105,7 +110,7 @@ class TdControl(Lab[TdParams, TdState]):
         task, many = params.task, len(params.methods)
         training = initial_training(task, many, params.learners, rng, params.q0)
         return TdState(
-            training=training, walk=start_greedy_walk(task, many), random=seeded(rng, 1)[0]
+            training=training, walk=start_greedy_walk(task, many), random=random_states(rng, 1)[0]
         )
 
     def step(self, params: TdParams, inputs: Inputs, state: TdState) -> TdState:
@@ -113,7 +118,7 @@ class TdControl(Lab[TdParams, TdState]):
         if state.trouble:
             return state
         _, s = params.view
-        policies = _current(params, state)["q"][:, s].argmin(axis=2)
+        policies = _training_on_map(params, state)["q"][:, s].argmin(axis=2)
         random = state.random.copy()
         walk = follow_greedy_policies(params.task, policies, state.walk, random)
         return replace(state, t=state.t + self.period, walk=walk, random=random)
@@ -137,8 +142,8 @@ class TdControl(Lab[TdParams, TdState]):
             if not training["sound"]:
                 done = "The estimates diverged."
             elif left == episodes:
-                learned = f"{counted(episodes_done(training), 'episode')} learned."
-                done = f"{learned} {task.without_optimum}".strip()
+                learned = f"{count_text(episodes_done(training), 'episode')} learned."
+                done = f"{learned} {task.no_optimum_message}".strip()
             yield Snapshot(i, training, done, 1.0 - (left - episodes) / wanted)
 
     def accept(self, params: TdParams, state: TdState, snapshot: Snapshot) -> TdState:
@@ -165,11 +170,11 @@ class TdControl(Lab[TdParams, TdState]):
             for name, costs in zip(ORDER, training["offline"][..., -1], strict=False):
                 measured[f"greedy_{name}"] = float(np.median(costs))
                 if task.mdp.deterministic and np.isfinite(best):
-                    measured[f"best_{name}"] = float((costs <= best + OPTIMAL).sum())
+                    measured[f"best_{name}"] = float((costs <= best + OPTIMALITY_TOLERANCE).sum())
         return measured
 
     def fields(self, params: TdParams, state: TdState) -> Mapping[str, np.ndarray]:
-        task, training, (m, s) = params.task, _current(params, state), params.view
+        task, training, (m, s) = params.task, _training_on_map(params, state), params.view
         control = min(round(params.control), task.mdp.U)
         shown = learner_maps(task, training["q"][m, s], training["visits"][m, s], control)
         return shown | learning_curves(task, training)
@@ -184,12 +189,12 @@ class TdControl(Lab[TdParams, TdState]):
         return {"V": V, "greedy_control": control}
 
     def notes(self, params: TdParams, state: TdState) -> Mapping[str, str]:
-        task, (m, s), by_state = params.task, params.view, UNNAMED
-        about = [task.mdp.report([task.start]), task.without_optimum]
+        task, (m, s), by_state = params.task, params.view, NO_NAMES_NOTE
+        about = [task.mdp.describe([task.start]), task.no_optimum_message]
         if isinstance(task.place, CellWorld):
             about += task.place.notes
         if isinstance(task.place, TableWorld):
-            q = _current(params, state)["q"][m, s]
+            q = _training_on_map(params, state)["q"][m, s]
             by_state = task.place.describe(q.min(axis=1), q.argmin(axis=1))
         return {"about": "\n".join(filter(None, about)), "by_state": by_state}
 
@@ -204,7 +209,7 @@ class TdControl(Lab[TdParams, TdState]):
             "method": tuple(names),
             "first": names[0],
             "second": names[1] if len(names) > 1 else "",
-            "optimal": "" if params.task.without_optimum else "optimal",
+            "optimal": "" if params.task.no_optimum_message else "optimal",
             "distance": "RMS, dashed: largest"
             if params.task.compared.any()
             else "no Q* with γ = 1",
@@ -213,7 +218,7 @@ class TdControl(Lab[TdParams, TdState]):
         }
 
     def draw(self, scene: Scene, params: TdParams, state: TdState) -> None:
-        task, training, (m, s) = params.task, _current(params, state), params.view
+        task, training, (m, s) = params.task, _training_on_map(params, state), params.view
         tables, known = training["q"][:, s], training["visits"][m, s].any(axis=1)
         V, policy = tables[m].min(axis=1), tables[m].argmin(axis=1)
         if isinstance(state.walk, Swing):
@@ -222,7 +227,7 @@ class TdControl(Lab[TdParams, TdState]):
             high = float(task.q_star.min(axis=1).max())
             draw_table(scene, task.place, V, high, policy, state.walk, names, known=known)
             return
-        low, high = _span(task, V)
+        low, high = _color_range(task, V)
         if isinstance(task.place, TableWorld):
             draw_states(scene, task.place, V, (low, high), policy)
             draw_walkers(scene, task.place, state.walk)
@@ -230,7 +235,7 @@ class TdControl(Lab[TdParams, TdState]):
         assert isinstance(task.place, GridWorld)
         draw_board(scene, task.place, V, high, policy, low=low, known=known)
         for i, q in enumerate(tables):
-            draw_way(scene, task.place, nominal_path(task.place, q.argmin(axis=1)), i)
+            draw_path(scene, task.place, nominal_path(task.place, q.argmin(axis=1)), i)
         draw_walkers(scene, task.place, state.walk)
 
     @classmethod
@@ -238,20 +243,20 @@ class TdControl(Lab[TdParams, TdState]):
         """Compiles the loops of all methods, which the worlds share, and the draws of the walkers
         where moves are random."""
         lab = cls()
-        uniform(seeded(np.random.default_rng(0), 1)[0])
+        uniform(random_states(np.random.default_rng(0), 1)[0])
         for method in LEARNING_METHODS:
             params = TdParams(method=method, second="none")
             state = lab.init(params, np.random.default_rng(0))
             lab.step(params, Inputs(), lab.accept(params, state, next(lab.solve(params, state))))
 
 
-def _current(params: TdParams, state: TdState) -> Training:
+def _training_on_map(params: TdParams, state: TdState) -> Training:
     """What was learned, on the map of now."""
     task, training = params.task, state.training
     return training if fits_task(training, task) else transfer(training, task, params.q0)
 
 
-def _span(task: ControlTask, V: np.ndarray) -> tuple[float, float]:
+def _color_range(task: ControlTask, V: np.ndarray) -> tuple[float, float]:
     """The ends of the scale of colours: the values to be learned, and above them the largest
     estimate, within reason."""
     low, high = value_span(task.q_star[task.compared].min(axis=1))

@@ -4,7 +4,7 @@ import numpy as np
 
 from labs.algorithms import exploration
 from labs.algorithms.exploration import BehaviourPolicy
-from labs.params import Group, Params, When
+from labs.params import Condition, Group, Params
 from labs.problems.episodes import UpdateRule
 from labs.reinforcement_learning.td_control.tasks import (
     LARGEST_GAMMA,
@@ -36,7 +36,7 @@ LEARNERS = {"grid": 10, "pendulum": 5, "table": 10}
 """Of each method."""
 BATCHES = 250
 """Iterations of a training, or more while its episodes are long."""
-DIVERGED = 1e6
+DIVERGENCE_LIMIT = 1e6
 """Times the largest cost: what no estimate reaches that converges."""
 
 GRID = {"system": "grid"}
@@ -47,7 +47,7 @@ EXPLORATION = Group("Exploration", effect="solve")
 VIEW = Group("View")
 
 
-def _either(method: str) -> When:
+def _if_method(method: str) -> Condition:
     """Where one of the two methods is this one."""
     return ({"method": method}, {"second": method})
 
@@ -122,7 +122,9 @@ class TdParams(Params):
         "sarsa", {"none": "None", **LEARNING_METHODS}, "Second method", effect="restart", key=True
     )
     """Orange. Both begin with the same luck."""
-    n: float = LEARNING.knob(4, 1, 20, "n", "", "Steps", step=1, key=True, when=_either("sarsa-n"))
+    n: float = LEARNING.knob(
+        4, 1, 20, "n", "", "Steps", step=1, key=True, when=_if_method("sarsa-n")
+    )
     """Costs that SARSA(n) waits for before it trusts its estimate of the rest."""
     decay: float = LEARNING.knob(
         0.5,
@@ -133,12 +135,12 @@ class TdParams(Params):
         "Trace decay",
         step=0.01,
         key=True,
-        when=_either("sarsa-lambda"),
+        when=_if_method("sarsa-lambda"),
     )
     """Of SARSA(λ): 0 is SARSA, 1 waits for all costs of the episode."""
-    replacing: bool = LEARNING.toggle(False, "Replacing traces", when=_either("sarsa-lambda"))
+    replacing: bool = LEARNING.toggle(False, "Replacing traces", when=_if_method("sarsa-lambda"))
     """A pair met again has trace 1 instead of one more; keeps SARSA(λ) from diverging."""
-    offline: bool = LEARNING.toggle(False, "Learn at the end", when=_either("sarsa-lambda"))
+    offline: bool = LEARNING.toggle(False, "Learn at the end", when=_if_method("sarsa-lambda"))
     """SARSA(λ) takes all updates of an episode at its end."""
     alpha: float = LEARNING.knob(0.5, 0.0, 1.0, r"\alpha", "", "Step size", step=0.01, key=True)
     """How far one surprise moves an estimate."""
@@ -247,14 +249,14 @@ class TdParams(Params):
     def behaviour(self) -> BehaviourPolicy:
         """Who decides while learning."""
         kind = list(EXPLORATIONS).index(self.explorer)
-        follows = kind == exploration.FOLLOW
-        policy = self.task.teacher if follows else np.zeros(0, np.int64)
+        follows = kind == exploration.FIXED_POLICY
+        policy = self.task.reference_policy if follows else np.zeros(0, np.int64)
         return BehaviourPolicy(kind, self.epsilon, self.fading, self.beta, self.bound, policy)
 
     @property
     def rule(self) -> UpdateRule:
         """How estimates move."""
-        limit = DIVERGED * max(1.0, self.task.mdp.largest_cost)
+        limit = DIVERGENCE_LIMIT * max(1.0, self.task.mdp.largest_cost)
         n = round(self.n)
         return UpdateRule(
             self.alpha, self.omega, n, self.decay, self.replacing, self.offline, limit

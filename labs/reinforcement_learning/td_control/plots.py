@@ -106,7 +106,7 @@ def learning_curves(task: ControlTask, training: Training) -> dict[str, np.ndarr
         there = m < len(training["q"])
         found[f"episodes_{name}"] = episodes if there else none
         curves = {c: training[c][m] if there else np.zeros((1, 0)) for c in CURVES}
-        curves["online"] = _smooth(curves["online"])
+        curves["online"] = _moving_average(curves["online"])
         for curve, points in curves.items():
             # One learner who walks in circles hides all others in a mean of greedy costs.
             middle = np.median if curve == "offline" else np.mean
@@ -116,7 +116,7 @@ def learning_curves(task: ControlTask, training: Training) -> dict[str, np.ndarr
     return found
 
 
-def _smooth(curves: np.ndarray) -> np.ndarray:
+def _moving_average(curves: np.ndarray) -> np.ndarray:
     """Each point (..., k) the mean of itself and up to WINDOW - 1 before it."""
     sums = np.cumsum(curves, axis=-1)
     late = sums[..., WINDOW:] - sums[..., :-WINDOW]

@@ -18,7 +18,7 @@ from labs.tasks.pendulum_table.table import PendulumGrid, pendulum_grid
 
 HORIZONS: Mapping[str, int] = {"grid": 500, "pendulum": 100, "table": 100}
 """An episode is cut after these."""
-PENDULUM = pendulum_grid(rods=1, q_nodes=41, v_nodes=31, levels=5)
+PENDULUM_GRID = pendulum_grid(rods=1, q_nodes=41, v_nodes=31, levels=5)
 """1271 states, 5 torques, 0.1 s a step. Its motor lifts half of what it takes to hold it level."""
 LARGEST_GAMMA = 0.99
 """Largest discount of the pendulum's costs, which have no end."""
@@ -40,7 +40,7 @@ class ControlTask:
     """(X, U) Q*; infinite where no control ever leads to an end."""
     compared: np.ndarray
     """(X,) bool: where learners are compared with it: what they can meet and leave again."""
-    teacher: np.ndarray
+    reference_policy: np.ndarray
     """(X,) int64: the other controller's choices."""
     shape: tuple[int, int]
     """(rows, columns) of a map of the states: of the grid world; velocities and angles."""
@@ -53,7 +53,7 @@ class ControlTask:
         return int(self.evaluation.starts[0])
 
     @cached_property
-    def without_optimum(self) -> str:
+    def no_optimum_message(self) -> str:
         """Why the start has no optimal cost, in a sentence; empty where it has one."""
         V = self.q_star.min(axis=1)
         message = "" if np.isfinite(V[self.start]) else unbounded_message(V)
@@ -102,13 +102,13 @@ def table_task(text: str, gamma: float, anywhere: bool) -> ControlTask:
 @lru_cache(maxsize=8)
 def pendulum_task(gamma: float, effort: float, anywhere: bool) -> ControlTask:
     """To swing up from hanging at rest and stay there."""
-    mdp = PENDULUM.mdp(gamma, w_u=effort)
-    start = int(PENDULUM.state(np.zeros(1), np.zeros(1)))
-    angles, velocities = PENDULUM.shape
+    mdp = PENDULUM_GRID.mdp(gamma, w_u=effort)
+    start = int(PENDULUM_GRID.state(np.zeros(1), np.zeros(1)))
+    angles, velocities = PENDULUM_GRID.shape
     i, j = np.divmod(np.arange(mdp.X), velocities)
     maps = ((velocities, angles), np.stack([j, i], axis=1))
-    horizon, teacher = HORIZONS["pendulum"], pd_policy(PENDULUM)
-    return _task(mdp, PENDULUM, start, anywhere, horizon, teacher, *maps)
+    horizon, teacher = HORIZONS["pendulum"], pd_policy(PENDULUM_GRID)
+    return _task(mdp, PENDULUM_GRID, start, anywhere, horizon, teacher, *maps)
 
 
 def cautious_policy(world: GridWorld) -> np.ndarray:
@@ -152,7 +152,7 @@ def _task(
         evaluation=episodic_task(mdp, [start], horizon),
         q_star=q_star,
         compared=mdp.reachable(starts) & ~mdp.terminal & np.isfinite(q_star).all(axis=1),
-        teacher=teacher,
+        reference_policy=teacher,
         shape=shape,
         cells=cells,
     )

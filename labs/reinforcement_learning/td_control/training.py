@@ -19,7 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from labs.algorithms.exploration import BehaviourPolicy
-from labs.algorithms.policy_evaluation import exact
+from labs.algorithms.policy_evaluation import exact_values
 from labs.algorithms.td_control import SARSA_LAMBDA, Learners, greedy_costs, init, step
 from labs.algorithms.td_lambda import NEGLIGIBLE_TRACE
 from labs.arrays import Training
@@ -27,12 +27,12 @@ from labs.problems.episodes import UpdateRule
 from labs.reinforcement_learning.td_control.tasks import ControlTask
 
 CURVES = ("online", "offline", "off", "most")
-STEP_TIME, TRACE_TIME, BUDGET = 40.0, 2.5, 4e6
+STEP_TIME, TRACE_TIME, BATCH_TIME = 40.0, 2.5, 4e6
 """[ns] About what a transition takes, a trace at each transition, and what a batch may take for
 the scene to go on."""
-EVALUATIONS = 20
+EVALUATION_EPISODES = 20
 """Of a greedy policy where luck has a say in what it costs."""
-KEPT = 1000
+HISTORY_LENGTH = 1000
 """Batches whose curves are kept; older ones are dropped."""
 
 
@@ -72,11 +72,11 @@ def train(
         step(task.learning, behaviour, rule, method, _learners(training, m), episodes)
         for m, method in enumerate(methods)
     ]
-    trials = 1 if task.mdp.deterministic else EVALUATIONS
+    trials = 1 if task.mdp.deterministic else EVALUATION_EPISODES
     errors = np.array([[task.errors(q) for q in learners.q] for learners in after])
     points = {
         "online": np.array([learners.costs.mean(axis=1) for learners in after]),
-        "offline": np.array([_offline(task, learners, trials) for learners in after]),
+        "offline": np.array([_greedy_policy_costs(task, learners, trials) for learners in after]),
         "off": errors[..., 0],
         "most": errors[..., 1],
     }
@@ -86,21 +86,21 @@ def train(
         "visits": np.stack([learners.visits for learners in after]),
         "random": np.stack([learners.random for learners in after]),
         "cells": task.cells,
-        "sound": np.array(all(learners.sound for learners in after)),
+        "sound": np.array(all(learners.bounded for learners in after)),
         "lengths": np.array([learners.lengths.mean() for learners in after]),
-        "episodes": np.append(training["episodes"], float(done))[-KEPT:],
+        "episodes": np.append(training["episodes"], float(done))[-HISTORY_LENGTH:],
     } | {
-        name: np.concatenate([training[name], point[..., None]], axis=2)[..., -KEPT:]
+        name: np.concatenate([training[name], point[..., None]], axis=2)[..., -HISTORY_LENGTH:]
         for name, point in points.items()
     }
 
 
-def _offline(task: ControlTask, learners: Learners, trials: int) -> np.ndarray:
+def _greedy_policy_costs(task: ControlTask, learners: Learners, trials: int) -> np.ndarray:
     """(S,) from the start. An episode that is cut costs less than the policy does, and may cost
     less than the best."""
     if task.mdp.deterministic and task.mdp.gamma < 1.0:
         policies = learners.q.argmin(axis=2)
-        return np.array([exact(task.mdp, policy)[task.start] for policy in policies])
+        return np.array([exact_values(task.mdp, policy)[task.start] for policy in policies])
     return greedy_costs(task.evaluation, learners, trials)
 
 
@@ -119,7 +119,7 @@ def batch_size(
     for method, length in zip(methods, training["lengths"], strict=True):
         traces = min(length, memory, task.q_star.size) if method == SARSA_LAMBDA else 0.0
         load += seeds * length * (STEP_TIME + TRACE_TIME * traces)
-    return int(np.clip(BUDGET / max(load, 1.0), 1, most))
+    return int(np.clip(BATCH_TIME / max(load, 1.0), 1, most))
 
 
 def episodes_done(training: Training) -> int:

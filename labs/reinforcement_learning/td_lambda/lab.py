@@ -9,16 +9,16 @@ import numpy as np
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
 from labs.problems.prediction import root_mean_square_error
-from labs.random_numbers import seeded
-from labs.reinforcement_learning.td_lambda.live import (
+from labs.random_numbers import random_states
+from labs.reinforcement_learning.td_lambda.params import TD_METHODS, TdLambdaParams
+from labs.reinforcement_learning.td_lambda.partial_episode import (
     PartialEpisode,
-    credit,
     draw_episode,
-    learned,
+    eligibility,
     n_step_returns,
     return_weights,
+    updated_values,
 )
-from labs.reinforcement_learning.td_lambda.params import TD_METHODS, TdLambdaParams
 from labs.reinforcement_learning.td_lambda.picture import draw_place
 from labs.reinforcement_learning.td_lambda.plots import (
     ORDER,
@@ -28,17 +28,22 @@ from labs.reinforcement_learning.td_lambda.plots import (
     sweep_curves,
     sweep_numbers,
 )
-from labs.reinforcement_learning.td_lambda.sweep import NOTHING, SweepErrors, family_names, run
+from labs.reinforcement_learning.td_lambda.sweep import (
+    EMPTY_SWEEP,
+    SweepErrors,
+    family_names,
+    run_sweep,
+)
 from labs.scene import Scene
 from labs.tasks.grid_world.map import MAPS, grid_world
 from labs.tasks.grid_world.params import edit_map
 from labs.tasks.random_walk.picture import state_names
-from labs.tasks.random_walk.walks import NINETEEN
+from labs.tasks.random_walk.walks import NINETEEN_STATE_WALK
 
 ROUNDING = 1e-9
 REST = 3.0
 """Steps that a walker rests at the end of an episode."""
-KEPT = 1000
+HISTORY_LENGTH = 1000
 """Episodes whose errors are kept; older ones are dropped."""
 
 
@@ -91,7 +96,7 @@ class TdLambda(Lab[TdLambdaParams, TdLambdaState]):
 
     def init(self, params: TdLambdaParams, rng: np.random.Generator) -> TdLambdaState:
         place = params.place
-        seed, random = seeded(rng, 2)
+        seed, random = random_states(rng, 2)
         nothing = np.zeros((len(params.methods), len(place.task.truth)))
         return TdLambdaState(
             seed=seed,
@@ -101,7 +106,7 @@ class TdLambda(Lab[TdLambdaParams, TdLambdaState]):
             values=nothing,
             changed=np.zeros(0, int),
             gaps=np.zeros(0),
-            sweep=NOTHING,
+            sweep=EMPTY_SWEEP,
         )
 
     def step(self, params: TdLambdaParams, inputs: Inputs, state: TdLambdaState) -> TdLambdaState:
@@ -114,12 +119,12 @@ class TdLambda(Lab[TdLambdaParams, TdLambdaState]):
             steps = draw_episode(params.place, random)
             return replace(state, steps=steps, random=random, before=state.values, wait=0.0)
         if not state.steps.over and (state.wait >= 1.0 - ROUNDING or state.steps.done == 0):
-            return _walked(params, state)
+            return _advance_walk(params, state)
         return state
 
     def solve(self, params: TdLambdaParams, state: TdLambdaState) -> Iterator[Snapshot | None]:
         """A setting of the sweep an iteration; what was measured before stays."""
-        return run(params, state.seed, state.sweep)
+        return run_sweep(params, state.seed, state.sweep)
 
     def accept(
         self, params: TdLambdaParams, state: TdLambdaState, snapshot: Snapshot
@@ -157,7 +162,7 @@ class TdLambda(Lab[TdLambdaParams, TdLambdaState]):
             "target": np.full(2 if len(returns) else 0, weights @ returns),
             "true_value": np.full(2 if len(returns) else 0, place.task.truth[place.start]),
             **gap_curves(place, state.gaps, state.episodes),
-            **place_maps(place, _trace(params, state), state.values),
+            **place_maps(place, _eligibility_trace(params, state), state.values),
             **sweep_curves(params, state.sweep),
         }
 
@@ -174,12 +179,12 @@ class TdLambda(Lab[TdLambdaParams, TdLambdaState]):
             "second": names[-1],
             "family": family_names(params.method),
             "member": "n" if params.method == "n-step" else "λ",
-            "states": state_names(NINETEEN) if params.system == "walk" else (),
+            "states": state_names(NINETEEN_STATE_WALK) if params.system == "walk" else (),
         }
 
     def draw(self, scene: Scene, params: TdLambdaParams, state: TdLambdaState) -> None:
         part = min(state.wait, 1.0)
-        glow, trace = params.shown == "traces", _trace(params, state)
+        glow, trace = params.shown == "traces", _eligibility_trace(params, state)
         draw_place(scene, params.place, state.steps, part, trace, list(state.values), glow)
 
     @classmethod
@@ -194,11 +199,11 @@ class TdLambda(Lab[TdLambdaParams, TdLambdaState]):
                 state = lab.step(params, Inputs(), state)
 
 
-def _walked(params: TdLambdaParams, state: TdLambdaState) -> TdLambdaState:
+def _advance_walk(params: TdLambdaParams, state: TdLambdaState) -> TdLambdaState:
     """One step of the walk later."""
     place, steps = params.place, state.steps._replace(done=state.steps.done + 1)
     values = np.array([
-        learned(place, method, params.rule(method), V, steps)
+        updated_values(place, method, params.rule(method), V, steps)
         for method, V in zip(params.methods, state.before, strict=True)
     ])  # fmt: skip
     state = replace(state, steps=steps, wait=0.0)
@@ -209,14 +214,14 @@ def _walked(params: TdLambdaParams, state: TdLambdaState) -> TdLambdaState:
     if not steps.over:
         return state
     changed = (values != state.before).sum(axis=1)
-    gaps = np.append(state.gaps, np.abs(values[0] - values[-1]).max())[-KEPT:]
+    gaps = np.append(state.gaps, np.abs(values[0] - values[-1]).max())[-HISTORY_LENGTH:]
     return replace(state, episodes=state.episodes + 1, changed=changed, gaps=gaps)
 
 
-def _trace(params: TdLambdaParams, state: TdLambdaState) -> np.ndarray:
+def _eligibility_trace(params: TdLambdaParams, state: TdLambdaState) -> np.ndarray:
     """(X,) of the first method; none once the walker rests."""
     rule, states = params.rule(params.method), state.values.shape[1]
-    return credit(params.gamma, params.method, rule, state.steps, states)
+    return eligibility(params.gamma, params.method, rule, state.steps, states)
 
 
 def _divergence_message(method: str, episode: int) -> str:

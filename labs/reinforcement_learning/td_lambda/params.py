@@ -6,9 +6,9 @@ from typing import Annotated
 from pydantic import AfterValidator
 
 from labs.algorithms import prediction
-from labs.params import Group, Params, When
+from labs.params import Condition, Group, Params
 from labs.problems.episodes import UpdateRule
-from labs.reinforcement_learning.td_lambda.tasks import Place, grid_place, walk_place
+from labs.reinforcement_learning.td_lambda.tasks import PredictionPlace, grid_place, walk_place
 from labs.tasks.grid_world.map import MAPS, grid_world
 from labs.tasks.grid_world.params import MAP_LENGTH, MapText
 
@@ -20,10 +20,10 @@ TD_METHODS = {
     "td0": "TD(0)",
     "monte-carlo": "Monte Carlo",
 }
-NUMBERS = {
+METHOD_NUMBERS = {
     "n-step": prediction.N_STEP,
     "forward": prediction.LAMBDA_RETURN,
-    "backward": prediction.TRACES,
+    "backward": prediction.ELIGIBILITY_TRACES,
     "true-online": prediction.TRUE_ONLINE,
     "td0": prediction.TD0,
     "monte-carlo": prediction.EVERY_VISIT,
@@ -32,7 +32,7 @@ NUMBERS = {
 LAMBDA_METHODS = ("forward", "backward", "true-online")
 OFFLINE_METHODS = tuple(name for name in TD_METHODS if name != "true-online")
 """That may take all updates of an episode at its end."""
-DIVERGED = 1e6
+DIVERGENCE_LIMIT = 1e6
 """Times the largest cost-to-go: what no estimate reaches that converges."""
 GRID = {"system": "grid"}
 
@@ -41,7 +41,7 @@ LEARNING = Group("Learning", effect="solve")
 VIEW = Group("View")
 
 
-def _leads_to_the_goal(text: str) -> str:
+def _require_reachable_goal(text: str) -> str:
     world = grid_world(text, False)
     if world.terminal.all():
         raise ValueError("every cell of the map is a goal: an episode needs one to start in")
@@ -55,10 +55,10 @@ def _leads_to_the_goal(text: str) -> str:
     return text
 
 
-OpenMap = Annotated[MapText, AfterValidator(_leads_to_the_goal)]
+OpenMap = Annotated[MapText, AfterValidator(_require_reachable_goal)]
 
 
-def _either(methods: Sequence[str]) -> When:
+def _if_method(methods: Sequence[str]) -> Condition:
     """Where one of the two methods is among these."""
     return ({"method": methods}, {"second": methods})
 
@@ -93,7 +93,9 @@ class TdLambdaParams(Params):
         "none", {"none": "None", **TD_METHODS}, "Second", effect="restart", key=True
     )
     """Orange. Both meet the same episodes."""
-    n: float = LEARNING.knob(4, 1, 64, "n", "", "Steps", step=1, key=True, when=_either(["n-step"]))
+    n: float = LEARNING.knob(
+        4, 1, 64, "n", "", "Steps", step=1, key=True, when=_if_method(["n-step"])
+    )
     """Costs to wait for before the rest is taken from the table."""
     lam: float = LEARNING.knob(
         0.8,
@@ -104,13 +106,13 @@ class TdLambdaParams(Params):
         "Trace decay",
         step=0.01,
         key=True,
-        when=_either(LAMBDA_METHODS),
+        when=_if_method(LAMBDA_METHODS),
     )
     """Of one n-step return to the next: 0 is TD(0), 1 Monte Carlo."""
     alpha: float = LEARNING.knob(0.4, 0.0, 1.0, r"\alpha", "", "Step size", step=0.01, key=True)
     """The part of the way to its target that an estimate moves."""
     offline: bool = LEARNING.toggle(
-        False, "Learn at the end", key=True, when=_either(OFFLINE_METHODS)
+        False, "Learn at the end", key=True, when=_if_method(OFFLINE_METHODS)
     )
     """The values stand still through an episode and take all its updates at its end."""
     episodes: float = LEARNING.knob(10, 1, 100, "K", "", "Episodes", scale="linear", step=1)
@@ -126,7 +128,7 @@ class TdLambdaParams(Params):
     """Of the weights in the plot of bars."""
 
     @property
-    def place(self) -> Place:
+    def place(self) -> PredictionPlace:
         """Where the walk goes."""
         if self.system == "walk":
             return walk_place(self.gamma)
@@ -150,5 +152,5 @@ class TdLambdaParams(Params):
             n=round(self.n),
             trace_decay=self.lam,
             offline=self.offline and method in OFFLINE_METHODS,
-            limit=DIVERGED * self.place.scale,
+            limit=DIVERGENCE_LIMIT * self.place.scale,
         )

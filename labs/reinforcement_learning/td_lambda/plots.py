@@ -10,16 +10,16 @@ from labs.reinforcement_learning.td_lambda.sweep import (
     ALPHAS,
     SweepErrors,
     family_values,
-    measured,
-    plan,
+    known_errors,
+    sweep_parts,
 )
-from labs.reinforcement_learning.td_lambda.tasks import Place
+from labs.reinforcement_learning.td_lambda.tasks import PredictionPlace
 
 ORDER = ("first", "second")
 SECOND = {"second": tuple(TD_METHODS)}
 WALK, GRID = {"system": ("walk",)}, {"system": ("grid",)}
 FAMILIES = {"method": ("n-step", "forward", "backward", "true-online")}
-ABOVE = 1.1
+SHOWN_ERROR_RATIO = 1.1
 """Times the error of having learned nothing: curves end there."""
 
 
@@ -88,18 +88,20 @@ PLOTS: tuple[Plot, ...] = (
 
 def sweep_curves(params: TdLambdaParams, sweep: SweepErrors) -> dict[str, np.ndarray]:
     """Errors over step sizes, NaN where not measured yet or larger than shown."""
-    parts, untrained = plan(params), params.place.untrained
-    here = measured(sweep, "here", parts["here"])
+    parts, untrained = sweep_parts(params), params.place.initial_error
+    here = known_errors(sweep, "here", parts["here"])
     members, methods = len(family_values(params.method)), len(params.methods)
     alpha = np.array([params.alpha])
     return {
         "alphas": ALPHAS,
-        "family_errors": _columns(measured(sweep, "family", parts["family"]), members, untrained),
-        "own": _columns(measured(sweep, "own", parts["own"]), methods, untrained),
+        "family_errors": _error_columns(
+            known_errors(sweep, "family", parts["family"]), members, untrained
+        ),
+        "own": _error_columns(known_errors(sweep, "own", parts["own"]), methods, untrained),
         "here_alpha": alpha[: len(here)],
-        "here_first": _shown(here[:1], untrained),
+        "here_first": _mask_large_errors(here[:1], untrained),
         "here_alphas": np.repeat(alpha, len(here)),
-        "here": _shown(here, untrained),
+        "here": _mask_large_errors(here, untrained),
         "ends": ALPHAS[[0, -1]],
         "untrained": np.full(2, untrained),
     }
@@ -107,8 +109,8 @@ def sweep_curves(params: TdLambdaParams, sweep: SweepErrors) -> dict[str, np.nda
 
 def sweep_numbers(params: TdLambdaParams, sweep: SweepErrors) -> dict[str, float]:
     """The errors as set, and the least of the family once it is complete."""
-    parts = plan(params)
-    here, family = (measured(sweep, part, parts[part]) for part in ("here", "family"))
+    parts = sweep_parts(params)
+    here, family = (known_errors(sweep, part, parts[part]) for part in ("here", "family"))
     found = {f"here_{name}": float(error) for name, error in zip(ORDER, here, strict=False)}
     if len(family) == len(parts["family"].rules):
         member, at = divmod(int(family.argmin()), len(ALPHAS))
@@ -118,18 +120,18 @@ def sweep_numbers(params: TdLambdaParams, sweep: SweepErrors) -> dict[str, float
     return found
 
 
-def _columns(errors: np.ndarray, many: int, untrained: float) -> np.ndarray:
+def _error_columns(errors: np.ndarray, many: int, untrained: float) -> np.ndarray:
     """(A, many): a curve a column, from those measured so far, one curve after another."""
     full = np.full(many * len(ALPHAS), np.nan)
-    full[: len(errors)] = _shown(errors, untrained)
+    full[: len(errors)] = _mask_large_errors(errors, untrained)
     return full.reshape(many, -1).T
 
 
-def _shown(errors: np.ndarray, untrained: float) -> np.ndarray:
-    return np.where(errors <= ABOVE * untrained, errors, np.nan)
+def _mask_large_errors(errors: np.ndarray, untrained: float) -> np.ndarray:
+    return np.where(errors <= SHOWN_ERROR_RATIO * untrained, errors, np.nan)
 
 
-def gap_curves(place: Place, gaps: np.ndarray, episodes: int) -> dict[str, np.ndarray]:
+def gap_curves(place: PredictionPlace, gaps: np.ndarray, episodes: int) -> dict[str, np.ndarray]:
     """The differences of two methods after each of the last episodes, between the largest value
     there is and what rounding makes of it."""
     first = episodes - len(gaps) + 1
@@ -143,7 +145,9 @@ def gap_curves(place: Place, gaps: np.ndarray, episodes: int) -> dict[str, np.nd
     }
 
 
-def place_maps(place: Place, trace: np.ndarray, values: np.ndarray) -> Mapping[str, np.ndarray]:
+def place_maps(
+    place: PredictionPlace, trace: np.ndarray, values: np.ndarray
+) -> Mapping[str, np.ndarray]:
     """The traces and values (M, X): those of the walk's states, or on the map of the grid, seen
     from above; of the other, nothing."""
     inside = slice(1, -1) if place.world is None else slice(0)

@@ -15,24 +15,28 @@ from labs.algorithms import prediction
 from labs.algorithms.prediction import Predictors
 from labs.lab import Snapshot
 from labs.problems.episodes import UpdateRule
-from labs.reinforcement_learning.td_lambda.params import LAMBDA_METHODS, NUMBERS, TdLambdaParams
-from labs.reinforcement_learning.td_lambda.tasks import Place
+from labs.reinforcement_learning.td_lambda.params import (
+    LAMBDA_METHODS,
+    METHOD_NUMBERS,
+    TdLambdaParams,
+)
+from labs.reinforcement_learning.td_lambda.tasks import PredictionPlace
 
 ALPHAS = np.array([0, 2, 4, 6, 8, *range(10, 101, 5)]) / 100.0
 """Denser where Monte Carlo is at its best."""
-STEPS = (1, 2, 4, 8, 16, 32, 64, 128)
-DECAYS = (0.0, 0.4, 0.8, 0.9, 0.95, 0.975, 0.99, 1.0)
+N_VALUES = (1, 2, 4, 8, 16, 32, 64, 128)
+LAMBDA_VALUES = (0.0, 0.4, 0.8, 0.9, 0.95, 0.975, 0.99, 1.0)
 """Of the family; those of figures 7.2 and 12.3 of Sutton and Barto, but for n = 256 and 512."""
 LEARNERS = 100
-CHUNK = 40_000
+CHUNK_STEPS = 40_000
 """Steps learned from at once: some milliseconds."""
-WORST = 10.0
+MAX_RELATIVE_ERROR = 10.0
 """Times the error of having learned nothing: larger errors, of learners that diverge, are given as
 that."""
 
 SweepErrors = Mapping[str, Mapping[str, str | np.ndarray]]
 """By the part: "key", which says of what, and "errors" (k,), those measured so far, in order."""
-NOTHING: SweepErrors = {
+EMPTY_SWEEP: SweepErrors = {
     part: {"key": "", "errors": np.zeros(0)} for part in ("here", "own", "family")
 }
 
@@ -48,19 +52,19 @@ class SweepPart(NamedTuple):
 def family_values(method: str) -> tuple[float, ...]:
     """The n or lambda of each curve of a method; one number without a meaning if it has neither."""
     if method == "n-step":
-        return STEPS
-    return DECAYS if method in LAMBDA_METHODS else (0.0,)
+        return N_VALUES
+    return LAMBDA_VALUES if method in LAMBDA_METHODS else (0.0,)
 
 
 def family_names(method: str) -> tuple[str, ...]:
     """The same in words."""
     if method == "n-step":
-        return tuple(f"n = {n}" for n in STEPS)
-    return tuple(f"λ = {lam:g}" for lam in DECAYS) if method in LAMBDA_METHODS else ("any",)
+        return tuple(f"n = {n}" for n in N_VALUES)
+    return tuple(f"λ = {lam:g}" for lam in LAMBDA_VALUES) if method in LAMBDA_METHODS else ("any",)
 
 
 @lru_cache(maxsize=4)
-def plan(params: TdLambdaParams) -> Mapping[str, SweepPart]:
+def sweep_parts(params: TdLambdaParams) -> Mapping[str, SweepPart]:
     """The parts of the sweep under these parameters, in order."""
     general = (*params.place_key, params.episodes, params.offline)
     own = (*general, *params.methods, round(params.n), params.lam)
@@ -74,20 +78,20 @@ def plan(params: TdLambdaParams) -> Mapping[str, SweepPart]:
     return {
         "here": SweepPart(repr((*own, params.alpha)), list(rules.items())),
         "own": SweepPart(
-            repr(own), [(m, r) for name in rules for m, r in _over_alpha(name, rules[name])]
+            repr(own), [(m, r) for name in rules for m, r in _rules_by_alpha(name, rules[name])]
         ),
         "family": SweepPart(
             repr((*general, params.method)),
-            [point for rule in members for point in _over_alpha(params.method, rule)],
+            [point for rule in members for point in _rules_by_alpha(params.method, rule)],
         ),
     }
 
 
-def _over_alpha(method: str, rule: UpdateRule) -> list[tuple[str, UpdateRule]]:
+def _rules_by_alpha(method: str, rule: UpdateRule) -> list[tuple[str, UpdateRule]]:
     return [(method, rule._replace(alpha=float(alpha))) for alpha in ALPHAS]
 
 
-def measured(sweep: SweepErrors, part: str, wanted: SweepPart) -> np.ndarray:
+def known_errors(sweep: SweepErrors, part: str, wanted: SweepPart) -> np.ndarray:
     """(k,) the errors of a part known so far; none if they are about something else."""
     there = sweep[part]
     errors = there["errors"] if there["key"] == wanted.key else np.zeros(0)
@@ -95,10 +99,12 @@ def measured(sweep: SweepErrors, part: str, wanted: SweepPart) -> np.ndarray:
     return errors
 
 
-def run(params: TdLambdaParams, seed: np.ndarray, sweep: SweepErrors) -> Iterator[Snapshot | None]:
+def run_sweep(
+    params: TdLambdaParams, seed: np.ndarray, sweep: SweepErrors
+) -> Iterator[Snapshot | None]:
     """Measures what is not known yet, a point an iteration."""
-    parts = plan(params)
-    known = {name: measured(sweep, name, part) for name, part in parts.items()}
+    parts = sweep_parts(params)
+    known = {name: known_errors(sweep, name, part) for name, part in parts.items()}
     total = sum(len(part.rules) for part in parts.values())
     place, episodes = params.place, round(params.episodes)
     learners = prediction.init(place.task, LEARNERS, np.random.default_rng(seed))
@@ -106,7 +112,7 @@ def run(params: TdLambdaParams, seed: np.ndarray, sweep: SweepErrors) -> Iterato
         (name, point) for name, part in parts.items() for point in part.rules[len(known[name]) :]
     ]
     for i, (name, (method, rule)) in enumerate(left, 1):
-        error = yield from measure(place, NUMBERS[method], rule, learners, episodes)
+        error = yield from mean_error(place, METHOD_NUMBERS[method], rule, learners, episodes)
         known = {**known, name: np.append(known[name], error)}
         data = {part: {"key": parts[part].key, "errors": known[part]} for part in parts}
         last = i == len(left)
@@ -116,20 +122,20 @@ def run(params: TdLambdaParams, seed: np.ndarray, sweep: SweepErrors) -> Iterato
         yield Snapshot(1, sweep, f"All {total} settings had been measured.", 1.0)
 
 
-def measure(
-    place: Place, method: int, rule: UpdateRule, learners: Predictors, episodes: int
+def mean_error(
+    place: PredictionPlace, method: int, rule: UpdateRule, learners: Predictors, episodes: int
 ) -> Generator[None, None, float]:
     """The mean error after each of the first episodes; yields None in between."""
-    several = max(1, int(CHUNK / (episodes * min(place.steps, place.task.task.horizon))))
+    several = max(1, int(CHUNK_STEPS / (episodes * min(place.mean_steps, place.task.task.horizon))))
     errors = []
     for first in range(0, len(learners.V), several):
         if first:
             yield None
-        some = _some(learners, slice(first, first + several))
+        some = _select_learners(learners, slice(first, first + several))
         errors.append(prediction.step(place.task, rule, method, some, episodes).errors)
-    return float(min(np.concatenate(errors).mean(), WORST * place.untrained))
+    return float(min(np.concatenate(errors).mean(), MAX_RELATIVE_ERROR * place.initial_error))
 
 
-def _some(learners: Predictors, which: slice) -> Predictors:
-    names = ("V", "visits", "random", "errors", "lengths", "sound")
+def _select_learners(learners: Predictors, which: slice) -> Predictors:
+    names = ("V", "visits", "random", "errors", "lengths", "bounded")
     return replace(learners, **{name: getattr(learners, name)[which] for name in names})

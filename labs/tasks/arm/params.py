@@ -5,24 +5,24 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from labs.models.arms import JOINTS, TITLES
+from labs.models.arms import ARM_TITLES, JOINT_COUNTS
 from labs.params import Group, Params
 from labs.tasks.arm.postures import POSED_ARMS
-from labs.tunables import Choices, Shared
+from labs.tunables import ChoiceCondition, TunableOptions
 
 MAX_JOINTS = 7
 """Knobs a group has for the joints; an arm with fewer joints ignores the last ones."""
 
 
-def robot_choice(group: Group, names: Sequence[str], **shared: Unpack[Shared]) -> Any:
+def robot_choice(group: Group, names: Sequence[str], **shared: Unpack[TunableOptions]) -> Any:
     """One of the arms of these names (`labs.models.arms`), at first the first."""
-    titles = {name: TITLES[name] for name in names}
+    titles = {name: ARM_TITLES[name] for name in names}
     return group.choice(names[0], titles, "Robot", **shared)
 
 
-def having_joint(joint: int, names: Sequence[str] = POSED_ARMS) -> Choices:
+def where_joint_exists(joint: int, names: Sequence[str] = POSED_ARMS) -> ChoiceCondition:
     """Where `robot`, one of these names, has this joint, from 1."""
-    return {"robot": [name for name in names if JOINTS[name] >= joint]}
+    return {"robot": [name for name in names if JOINT_COUNTS[name] >= joint]}
 
 
 def offset_knob(group: Group, joint: int) -> Any:
@@ -35,7 +35,7 @@ def offset_knob(group: Group, joint: int) -> Any:
         "rad",
         f"Joint {joint}",
         step=0.01,
-        when=having_joint(joint),
+        when=where_joint_exists(joint),
         help="Turns this joint away from the posture chosen.",
     )
 

@@ -11,7 +11,7 @@ from math import atan2, pi
 import numpy as np
 
 from labs.errors import LabError
-from labs.models.arms import load
+from labs.models.arms import load_arm
 from labs.models.plant import plant
 
 POSED_ARMS = ("ur5", "panda", "double-pendulum")
@@ -41,7 +41,7 @@ def posture(robot: str, name: str) -> np.ndarray:
     if name not in POSTURES:
         raise LabError(f"no posture is named {name!r}; there are {', '.join(POSTURES)}")
     if name == "home":
-        return load(robot).home
+        return load_arm(robot).home
     q = np.array(STRAIGHT[robot, name])
     if name == "outstretched" and robot != "double-pendulum":
         x, y, _ = plant(robot).tip(q)

@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labs.models.discrete import Discrete
+from labs.models.discrete import DiscreteMechanism
 from labs.problems.optimal_control import LARGEST_STATE
 from labs.tasks.direct.params import DirectParams
 from labs.tasks.direct.plan_params import PlanParams
 from labs.tasks.direct.trajectory import PiecewiseTrajectory
 
-STEP = 0.01
+MAX_STEP = 0.01
 """[s] The most a step of integration takes."""
 
 
@@ -40,8 +40,8 @@ def first_guess(params: DirectParams, N: int) -> Guess:
         U = U + params.guess_size * wave * at.u_0
         if params.bound is not None:
             U = np.clip(U, -params.bound, params.bound)
-        M = int(np.ceil(T / N / STEP - 1e-9))
-        fine = Discrete(at.mechanism, T / N / M, "rk4")
+        M = int(np.ceil(T / N / MAX_STEP - 1e-9))
+        fine = DiscreteMechanism(at.mechanism, T / N / M, "rk4")
         with np.errstate(all="ignore"):
             X = fine.rollout(at.x0, np.repeat(U, M, axis=0))[::M]
             sound = np.abs(X).max(axis=1) <= LARGEST_STATE
@@ -50,7 +50,7 @@ def first_guess(params: DirectParams, N: int) -> Guess:
     return Guess(X, U, T)
 
 
-def warm(params: PlanParams, reusable: bool) -> bool:
+def is_warm_start(params: PlanParams, reusable: bool) -> bool:
     """Whether to start from the present motion, which is `reusable` where the solve that it is of
     neither failed nor was infeasible, and no first guess."""
     return params.start == "warm" and reusable
@@ -58,12 +58,12 @@ def warm(params: PlanParams, reusable: bool) -> bool:
 
 def start_guess(params: DirectParams, motion: PiecewiseTrajectory, reusable: bool, N: int) -> Guess:
     """What a change of the problem is solved from: the present motion, or the first guess."""
-    if warm(params, reusable):
-        return resampled(params, motion, N)
+    if is_warm_start(params, reusable):
+        return resample_motion(params, motion, N)
     return first_guess(params, N)
 
 
-def resampled(params: DirectParams, motion: PiecewiseTrajectory, N: int) -> Guess:
+def resample_motion(params: DirectParams, motion: PiecewiseTrajectory, N: int) -> Guess:
     """The present motion on a grid of N steps, in the horizon's time if that is fixed."""
     T = motion.T if params.objective == "least-time" else params.horizon
     times = np.linspace(0.0, motion.T, N + 1)

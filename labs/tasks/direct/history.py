@@ -11,11 +11,11 @@ from labs.tasks.direct.params import DirectParams
 from labs.tasks.direct.systems import RestToRestTask
 from labs.tasks.direct.trajectory import PiecewiseTrajectory
 
-KEPT = 6
+KEPT_PATHS = 6
 """Iterations whose paths are drawn."""
 ARC_POINTS = 4
 """Of a piece."""
-SPEED = 0.2
+SCROLL_SPEED = 0.2
 """[m/s] along -x, at which what moves in a plane is drawn as if the world moved back: so that
 motions along one circle part."""
 
@@ -35,9 +35,9 @@ class IterationHistory:
     alpha: np.ndarray
     """(k,) the step lengths."""
     tips: np.ndarray
-    """(KEPT, pieces, ARC_POINTS, 3) [m] of the tip, the newest last."""
+    """(KEPT_PATHS, pieces, ARC_POINTS, 3) [m] of the tip, the newest last."""
     phases: np.ndarray
-    """(KEPT, pieces, ARC_POINTS, 2): position and velocity of the joint that tells most."""
+    """(KEPT_PATHS, pieces, ARC_POINTS, 2): position and velocity of the joint that tells most."""
 
     @classmethod
     def start(cls, params: DirectParams, at: SqpIterate, motion: PiecewiseTrajectory) -> Self:
@@ -50,8 +50,8 @@ class IterationHistory:
             gaps[None],
             none,
             none,
-            np.tile(tips, (KEPT, 1, 1, 1)),
-            np.tile(phases, (KEPT, 1, 1, 1)),
+            np.tile(tips, (KEPT_PATHS, 1, 1, 1)),
+            np.tile(phases, (KEPT_PATHS, 1, 1, 1)),
         )
 
     def append(self, params: DirectParams, at: SqpIterate, motion: PiecewiseTrajectory) -> Self:
@@ -72,9 +72,9 @@ class IterationHistory:
         return len(self.alpha)
 
 
-def drawn(at: RestToRestTask, places: np.ndarray, times: np.ndarray) -> np.ndarray:
+def shift_in_time(at: RestToRestTask, places: np.ndarray, times: np.ndarray) -> np.ndarray:
     """Places (..., 3) [m] at `times` (...) [s], moved back as time goes where motions are plane."""
-    shift = SPEED * times[..., None] * np.array([1.0, 0.0, 0.0])
+    shift = SCROLL_SPEED * times[..., None] * np.array([1.0, 0.0, 0.0])
     return np.asarray(places - shift if at.planar else places)
 
 
@@ -85,4 +85,4 @@ def _arcs(params: DirectParams, motion: PiecewiseTrajectory) -> tuple[np.ndarray
     tips = np.array([[body.tip(x[: body.nq]) for x in arc] for arc in X])
     h = motion.T / motion.pieces
     times = motion.times[:-1, None] + np.linspace(0.0, h, ARC_POINTS)
-    return drawn(params.task, tips, times), X[:, :, [joint, body.nq + joint]]
+    return shift_in_time(params.task, tips, times), X[:, :, [joint, body.nq + joint]]

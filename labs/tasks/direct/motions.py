@@ -10,7 +10,7 @@ from labs.algorithms.sqp import SqpIterate
 from labs.tasks.direct.trajectory import PiecewiseTrajectory
 
 
-def collocated_motion(program: Collocation, at: SqpIterate) -> PiecewiseTrajectory:
+def collocation_motion(program: Collocation, at: SqpIterate) -> PiecewiseTrajectory:
     """A piece for each kind of defect a step has; the defect is its gap."""
     grid, y, nx = program.grid, at.y, program.problem.dynamics.nx
     X, U = y[grid.states], y[grid.controls]
@@ -23,15 +23,19 @@ def multiple_shooting_motion(shooting: MultipleShooting, z: np.ndarray) -> Piece
     """Step by step. There are gaps where a segment begins."""
     arcs = shooting.arcs(z)
     X = np.concatenate([arcs.X, arcs.Y[-1:]])
-    return _held(shooting.horizon(z), X, arcs.Y, arcs.W[:, :-1])
+    return _piecewise_constant(shooting.horizon(z), X, arcs.Y, arcs.W[:, :-1])
 
 
 def single_shooting_motion(shooting: SingleShooting, y: np.ndarray) -> PiecewiseTrajectory:
     """Step by step, without a gap."""
     X = shooting.rollout(y).X
-    return _held(shooting.horizon(y), X, X[1:], np.repeat(shooting.controls(y), shooting.M, axis=0))
+    return _piecewise_constant(
+        shooting.horizon(y), X, X[1:], np.repeat(shooting.controls(y), shooting.M, axis=0)
+    )
 
 
-def _held(T: float, X: np.ndarray, ends: np.ndarray, U: np.ndarray) -> PiecewiseTrajectory:
+def _piecewise_constant(
+    T: float, X: np.ndarray, ends: np.ndarray, U: np.ndarray
+) -> PiecewiseTrajectory:
     """With the controls U (k, nu) each held for a piece."""
     return PiecewiseTrajectory(T, X, ends, np.stack([U, U], axis=1))

@@ -9,29 +9,34 @@ from labs.algorithms.sqp_iterate import HESSIANS, SqpOptions
 from labs.lab import ChoiceSettings
 from labs.params import Group, Params
 from labs.problems.continuous_control import ContinuousProblem
-from labs.tasks.direct.systems import TITLES, RestToRestTask, reaching_posture, system
+from labs.tasks.direct.systems import (
+    TASK_TITLES,
+    RestToRestTask,
+    reaching_posture,
+    rest_to_rest_task,
+)
 from labs.tasks.motion.continuous import OBJECTIVES, MotionLimits, continuous_motion
 from labs.tasks.motion.motions import MotionWeights
 from labs.tasks.motion.tip_constraints import Ball
-from labs.tunables import Choices
+from labs.tunables import ChoiceCondition
 
 T_LIMITS = (0.2, 6.0)
 """[s] of a free horizon."""
-LIGHT = tuple(name for name in TITLES if name != "ur5")
+LIGHT_SYSTEMS = tuple(name for name in TASK_TITLES if name != "ur5")
 """Systems whose derivatives cost little."""
 NEEDS_LIMIT = ("least-time", "fastest-end")
 """Objectives that have no minimum without a limit of the control."""
 MAY_LIMIT = {"objective": tuple(name for name in OBJECTIVES if name not in NEEDS_LIMIT)}
 LIMITED = ({"limited": True}, {"objective": NEEDS_LIMIT})
-RUN_AWAY = ("double-pendulum", "ur5")
+UNBOUNDED_SPEED = ("double-pendulum", "ur5")
 """Systems whose final speed has no maximum that is found without a limit of the velocity."""
-MAY_LIMIT_SPEED: tuple[Choices, ...] = (
+MAY_LIMIT_SPEED: tuple[ChoiceCondition, ...] = (
     {"objective": tuple(name for name in OBJECTIVES if name != "fastest-end")},
-    {"system": tuple(name for name in TITLES if name not in RUN_AWAY)},
+    {"system": tuple(name for name in TASK_TITLES if name not in UNBOUNDED_SPEED)},
 )
-SPEED_LIMITED: tuple[Choices, ...] = (
+SPEED_LIMITED: tuple[ChoiceCondition, ...] = (
     {"speed_limited": True},
-    {"objective": "fastest-end", "system": RUN_AWAY},
+    {"objective": "fastest-end", "system": UNBOUNDED_SPEED},
 )
 CHOICE_SETTINGS: ChoiceSettings = {
     "system": {"double-pendulum": {"limit": 1.0}, "ur5": {"horizon": 1.0}}
@@ -50,7 +55,7 @@ SOLVER = Group("Solver", effect="solve")
 class PlanParams(Params):
     """The motion, its limits and weights, and the solver."""
 
-    system: str = MOTION.choice("pendulum", TITLES, "System", key=True)
+    system: str = MOTION.choice("pendulum", TASK_TITLES, "System", key=True)
     """What moves: from rest to rest; all but the upright pendulum hang at first."""
     objective: str = MOTION.choice("least-energy", OBJECTIVES, "Minimise", key=True)
     """What is minimised. All but the weighted one end at the goal exactly."""
@@ -124,7 +129,7 @@ class PlanParams(Params):
 
     @property
     def task(self) -> RestToRestTask:
-        return system(self.system)
+        return rest_to_rest_task(self.system)
 
     @property
     def target(self) -> np.ndarray:
@@ -145,7 +150,7 @@ class PlanParams(Params):
         return reaching_posture(self.system, self.target)
 
     @property
-    def goal_place(self) -> np.ndarray:
+    def goal_position(self) -> np.ndarray:
         """Where the tip should end (3,) [m]."""
         at = self.task
         return at.mechanism.tip(at.goal) if len(at.goal) else self.target

@@ -15,10 +15,10 @@ from labs.tasks.direct.plan_params import PlanParams
 from labs.tasks.direct.trajectory import PiecewiseTrajectory
 from labs.tasks.motion.playback import SUBSTEP, NominalTrajectory, advance_playback
 from labs.tasks.motion.player import (
-    PERIOD,
+    WORLD_PERIOD,
     PlayerState,
     advance_clock,
-    measured_runs,
+    measure_runs,
     play_from_start,
 )
 
@@ -36,7 +36,7 @@ class DirectState(PlayerState):
 S = TypeVar("S", bound=DirectState)
 
 
-def replayed(
+def play_motion(
     state: S,
     motion: PiecewiseTrajectory,
     plan: NominalTrajectory,
@@ -47,31 +47,31 @@ def replayed(
     return replace(play_from_start(state, plan, failed), motion=motion, history=history)
 
 
-def advanced(params: DirectParams, state: S) -> S:
-    """PERIOD later; at the end of the motion a rest, and then from the start."""
+def advance_player(params: DirectParams, state: S) -> S:
+    """WORLD_PERIOD later; at the end of the motion a rest, and then from the start."""
     state, plays = advance_clock(state)
     if not plays:
         return state
-    plant = loaded(params)
+    plant = plant_with_payload(params)
     held = np.zeros(plant.nu)
     playback = advance_playback(
         state.plan,
         state.playback,
         (plant.acceleration(held), held),
-        round(PERIOD / SUBSTEP),
+        round(WORLD_PERIOD / SUBSTEP),
         params.bound,
     )
     state = replace(state, playback=playback)
     if not playback.finished(state.plan):
         return state
     ends = [plant.tip(x[: plant.nq]) for x in playback.x]
-    missed = [float(np.linalg.norm(end - params.goal_place)) for end in ends]
-    return replace(state, missed=np.array(missed))
+    missed = [float(np.linalg.norm(end - params.goal_position)) for end in ends]
+    return replace(state, goal_errors=np.array(missed))
 
 
-def measured(params: DirectParams, state: DirectState) -> dict[str, float | np.ndarray]:
+def measure_player(params: DirectParams, state: DirectState) -> dict[str, float | np.ndarray]:
     """Where both runs are beside the plan, and numbers of the iterations."""
-    return measured_runs(state) | {
+    return measure_runs(state) | {
         "cost": float(state.history.cost[-1]),
         "iteration": float(state.history.iterations),
         "violation": float(state.history.violation[-1]),
@@ -80,7 +80,9 @@ def measured(params: DirectParams, state: DirectState) -> dict[str, float | np.n
     }
 
 
-def dragged(params: PlanParams, handle: str, point: tuple[float, float, float]) -> dict[str, Value]:
+def edit_balls(
+    params: PlanParams, handle: str, point: tuple[float, float, float]
+) -> dict[str, Value]:
     """What the balls "target" and "obstacle" at `point` [m] say."""
     if handle not in ("target", "obstacle"):
         return {}
@@ -88,7 +90,7 @@ def dragged(params: PlanParams, handle: str, point: tuple[float, float, float]) 
     return {name: params.nearest(name, x) for name, x in zip(names, point, strict=True)}
 
 
-def labels_of(params: PlanParams) -> dict[str, str | tuple[str, ...]]:
+def plan_labels(params: PlanParams) -> dict[str, str | tuple[str, ...]]:
     """Of coordinates, and of the one that tells most."""
     words, joint = coordinate_labels(params.task.mechanism), params.task.shown
     name = {"mass": "position", "cart-pole": "pole", "ur5": "joint 2"}
@@ -96,6 +98,6 @@ def labels_of(params: PlanParams) -> dict[str, str | tuple[str, ...]]:
     return {**words, "shown": shown, "shown_unit": words["q_unit"][joint]}
 
 
-def loaded(params: DirectParams) -> Mechanism:
+def plant_with_payload(params: DirectParams) -> Mechanism:
     """The plant, with what the plan does not know of."""
     return mechanism(params.task.motion, params.payload)

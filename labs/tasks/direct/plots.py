@@ -4,7 +4,7 @@ multiple shooting and the race of direct methods."""
 from labs.plots import Line, Plot, TimeSeries
 
 
-def position_played(title: str = "Position") -> Plot:
+def position_plot(title: str = "Position") -> Plot:
     """With feedback, in open loop, and as planned."""
     return TimeSeries(
         title,
@@ -16,7 +16,7 @@ def position_played(title: str = "Position") -> Plot:
     )
 
 
-def control_played(title: str = "Control") -> Plot:
+def control_plot(title: str = "Control") -> Plot:
     """With feedback, and as planned."""
     return TimeSeries(
         title,

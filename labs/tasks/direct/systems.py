@@ -13,9 +13,9 @@ from labs.models.mechanisms import Mechanism, mechanism
 from labs.shapes import Vector3
 from labs.tasks.motion.continuous import CONTINUOUS_MOTIONS
 
-LEAN = 0.1
+INITIAL_LEAN = 0.1
 """[rad] by which the upright pendulum starts off."""
-TITLES: Mapping[str, str] = {
+TASK_TITLES: Mapping[str, str] = {
     "mass": "Mass on a line",
     "pendulum": "Pendulum, from hanging",
     "upright": "Pendulum, upright",
@@ -54,7 +54,7 @@ class RestToRestTask:
     @property
     def motor(self) -> int:
         """Which control tells most: of the joint that does, if it is driven."""
-        driven = self.mechanism.driven
+        driven = self.mechanism.actuated_joints
         return driven.index(self.shown) if self.shown in driven else 0
 
     def position_limits(self, margin: float) -> tuple[tuple[float, ...], tuple[float, ...]]:
@@ -78,19 +78,19 @@ class RestToRestTask:
 
 
 @cache
-def system(name: str) -> RestToRestTask:
-    """The one of this name, a key of TITLES."""
+def rest_to_rest_task(name: str) -> RestToRestTask:
+    """The one of this name, a key of TASK_TITLES."""
     motion_name = "pendulum" if name == "upright" else name
     motion, body = CONTINUOUS_MOTIONS[motion_name], mechanism(motion_name)
     goal, home = np.array(motion.goal), body.arm.home
-    q0 = goal - LEAN if name == "upright" else home
+    q0 = goal - INITIAL_LEAN if name == "upright" else home
     return RestToRestTask(
         motion_name,
         body,
         np.concatenate([q0, np.zeros(body.nq)]),
         goal,
         np.array(motion.control_scale),
-        body.holding(home),
+        body.equilibrium_control(home),
         motion.shown_joint,
     )
 
@@ -98,12 +98,12 @@ def system(name: str) -> RestToRestTask:
 def reaching_posture(name: str, target: np.ndarray) -> np.ndarray:
     """q (nq,) with the tip at, or as near as it comes to, `target` (3,) [m]; the goal of a system
     that has one."""
-    goal = system(name).goal
-    return goal if len(goal) else np.array(_reaching(name, tuple(target.tolist())))
+    goal = rest_to_rest_task(name).goal
+    return goal if len(goal) else np.array(_reaching_posture(name, tuple(target.tolist())))
 
 
 @lru_cache(maxsize=8)
-def _reaching(name: str, target: tuple[float, ...]) -> tuple[float, ...]:
-    body = system(name).mechanism
+def _reaching_posture(name: str, target: tuple[float, ...]) -> tuple[float, ...]:
+    body = rest_to_rest_task(name).mechanism
     q = nearest_posture(body.tip, body.tip_jacobian, np.array(target), body.arm.home)
     return tuple(q.tolist())

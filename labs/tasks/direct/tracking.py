@@ -10,31 +10,31 @@ import numpy as np
 
 from labs.algorithms import riccati
 from labs.errors import LabError
-from labs.models.discrete import Discrete
+from labs.models.discrete import DiscreteMechanism
 from labs.problems.linear_quadratic import LqrProblem
 from labs.tasks.direct.params import DirectParams
 from labs.tasks.direct.trajectory import PiecewiseTrajectory
 from labs.tasks.motion.playback import NominalTrajectory
 
-TICK = 0.01
+CONTROL_PERIOD = 0.01
 """[s] The control is held for it."""
 VELOCITY_WEIGHT = 0.01
 """w_v, in parts of w."""
 
 
-def playable(params: DirectParams, motion: PiecewiseTrajectory) -> NominalTrajectory:
+def nominal_trajectory(params: DirectParams, motion: PiecewiseTrajectory) -> NominalTrajectory:
     """The motion at ticks, with the regulator's gains; with none where there is no regulator."""
     at = params.task
-    N = max(1, round(motion.T / TICK))
-    ticks = TICK * np.arange(N + 1)
+    N = max(1, round(motion.T / CONTROL_PERIOD))
+    ticks = CONTROL_PERIOD * np.arange(N + 1)
     X, U = motion.states(at.mechanism, ticks), motion.mean_controls(ticks)
-    return NominalTrajectory(X, U, _gains(params, X, U), TICK)
+    return NominalTrajectory(X, U, _regulator_gains(params, X, U), CONTROL_PERIOD)
 
 
-def _gains(params: DirectParams, X: np.ndarray, U: np.ndarray) -> np.ndarray:
+def _regulator_gains(params: DirectParams, X: np.ndarray, U: np.ndarray) -> np.ndarray:
     at = params.task
     n = at.mechanism.nq
-    _, A, B = Discrete(at.mechanism, TICK, "rk4").linearize(X, U)
+    _, A, B = DiscreteMechanism(at.mechanism, CONTROL_PERIOD, "rk4").linearize(X, U)
     Q = np.diag(np.repeat([1.0, VELOCITY_WEIGHT], n)) * params.tracking
     R = np.diag(1.0 / at.u_0**2)
     try:

@@ -17,14 +17,20 @@ from itertools import product
 import numpy as np
 import pinocchio as pin
 
-from labs.models.arms import Arm, load
-from labs.models.two_link import TwoLink, directions, sample_postures, simulate, two_link
+from labs.models.arms import Arm, load_arm
+from labs.models.two_link import (
+    TwoLink,
+    joint_direction_features,
+    sample_postures,
+    simulate_two_link,
+    two_link,
+)
 from labs.random_numbers import uniform
-from labs.tasks.environments.torque_task import PERIOD, SUBSTEPS, TorqueTask
+from labs.tasks.environments.torque_task import CONTROL_PERIOD, SUBSTEPS, TorqueTask
 
-MOVING = (1, 2)
+MOVING_JOINTS = (1, 2)
 """Shoulder lift and elbow."""
-RANGES = np.array([[-2.2, -0.6], [0.4, 2.2]])
+JOINT_RANGES = np.array([[-2.2, -0.6], [0.4, 2.2]])
 """[rad] of each, within which episodes begin and targets lie: clear of the floor."""
 
 VELOCITY_LIMIT = np.pi
@@ -52,11 +58,11 @@ class Reach(TorqueTask):
 
     def tips(self, Q: np.ndarray) -> np.ndarray:
         """(k, 3) [m] at joint angles Q (k, 2)."""
-        return np.asarray(directions(Q) @ self.tip[:4] + self.tip[4])
+        return np.asarray(joint_direction_features(Q) @ self.tip[:4] + self.tip[4])
 
-    def starts(self, random: np.ndarray, many: int) -> np.ndarray:
+    def initial_states(self, random: np.ndarray, many: int) -> np.ndarray:
         drawn = np.array([[uniform(random) for _ in range(4)] for _ in range(many)])
-        low, size = RANGES[:, 0], RANGES[:, 1] - RANGES[:, 0]
+        low, size = JOINT_RANGES[:, 0], JOINT_RANGES[:, 1] - JOINT_RANGES[:, 0]
         return np.hstack(
             [low + size * drawn[:, :2], np.zeros((many, 2)), low + size * drawn[:, 2:]]
         )
@@ -66,7 +72,7 @@ class Reach(TorqueTask):
         to the target: (3,) [m], and its length."""
         way = self.tips(X[:, 4:]) - self.tips(X[:, :2])
         parts = [
-            (X[:, :2] - RANGES.mean(axis=1)) / np.pi,
+            (X[:, :2] - JOINT_RANGES.mean(axis=1)) / np.pi,
             X[:, 2:4] / VELOCITY_LIMIT,
             way,
             np.linalg.norm(way, axis=1, keepdims=True),
@@ -79,18 +85,18 @@ class Reach(TorqueTask):
         effort = ((torques / self.largest) ** 2).sum(axis=1)
         return np.asarray(w_p * distance + w_v * (X[:, 2:4] ** 2).sum(axis=1) + w_u * effort)
 
-    def hold(self, X: np.ndarray, torques: np.ndarray, parts: int = SUBSTEPS) -> np.ndarray:
-        body, h, limits = self.dynamics, PERIOD / SUBSTEPS, np.full(2, VELOCITY_LIMIT)
-        return simulate(2, body.inertia, body.gravity, X, torques, limits, h, parts)
+    def integrate(self, X: np.ndarray, torques: np.ndarray, parts: int = SUBSTEPS) -> np.ndarray:
+        body, h, limits = self.dynamics, CONTROL_PERIOD / SUBSTEPS, np.full(2, VELOCITY_LIMIT)
+        return simulate_two_link(2, body.inertia, body.gravity, X, torques, limits, h, parts)
 
 
 @cache
 def reach() -> Reach:
     """With three torques a joint."""
-    arm = load("ur5")
-    locked = [i + 1 for i in range(arm.model.nq) if i not in MOVING]
+    arm = load_arm("ur5")
+    locked = [i + 1 for i in range(arm.model.nq) if i not in MOVING_JOINTS]
     model = pin.buildReducedModel(arm.model, locked, arm.home)
-    model.armature = arm.model.armature[list(MOVING)]
+    model.armature = arm.model.armature[list(MOVING_JOINTS)]
     largest = np.array([30.0, 15.0])
     torques = largest * np.array(list(product((-1.0, 0.0, 1.0), repeat=2)))
     return Reach(two_link(model).without_gravity(), _tip(arm, model), torques, largest)
@@ -103,5 +109,5 @@ def _tip(arm: Arm, model: pin.Model) -> np.ndarray:
     for q, place in zip(Q, places, strict=True):
         pin.framesForwardKinematics(model, data, q)
         place[:] = data.oMf[model.getFrameId(frame)].translation
-    known = np.hstack([directions(Q), np.ones((len(Q), 1))])
+    known = np.hstack([joint_direction_features(Q), np.ones((len(Q), 1))])
     return np.asarray(np.linalg.lstsq(known, places, rcond=None)[0])

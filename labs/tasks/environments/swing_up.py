@@ -18,9 +18,9 @@ import numpy as np
 
 from labs.errors import LabError
 from labs.models.mechanisms import Mechanism, mechanism
-from labs.models.two_link import TwoLink, simulate, two_link
+from labs.models.two_link import TwoLink, simulate_two_link, two_link
 from labs.random_numbers import uniform
-from labs.tasks.environments.torque_task import PERIOD, SUBSTEPS, TorqueTask
+from labs.tasks.environments.torque_task import CONTROL_PERIOD, SUBSTEPS, TorqueTask
 
 START_VELOCITY = 1.0
 """[rad/s] Episodes begin anywhere, at most this fast."""
@@ -55,7 +55,7 @@ class SwingUp(TorqueTask):
         """Of the mechanism."""
         return two_link(self.mechanism.model)
 
-    def starts(self, random: np.ndarray, many: int) -> np.ndarray:
+    def initial_states(self, random: np.ndarray, many: int) -> np.ndarray:
         n = self.mechanism.nq
         drawn = np.array([[uniform(random) for _ in range(2 * n)] for _ in range(many)])
         return np.asarray((2.0 * drawn - 1.0) * np.repeat([np.pi, START_VELOCITY], n))
@@ -72,10 +72,10 @@ class SwingUp(TorqueTask):
         angle = np.remainder(X[:, :n] - self.goal + np.pi, 2.0 * np.pi) - np.pi
         return np.asarray(angle**2 @ w_q + X[:, n:] ** 2 @ w_v + torques**2 @ w_u)
 
-    def hold(self, X: np.ndarray, torques: np.ndarray, parts: int = SUBSTEPS) -> np.ndarray:
-        body, h = self.dynamics, PERIOD / SUBSTEPS
+    def integrate(self, X: np.ndarray, torques: np.ndarray, parts: int = SUBSTEPS) -> np.ndarray:
+        body, h = self.dynamics, CONTROL_PERIOD / SUBSTEPS
         tau = torques @ self.mechanism.S.T
-        return simulate(
+        return simulate_two_link(
             body.joints, body.inertia, body.gravity, X, tau, self.velocity_limit, h, parts
         )
 

@@ -5,7 +5,7 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-PERIOD = 0.05
+CONTROL_PERIOD = 0.05
 """[s] for which a control is held."""
 SUBSTEPS = 4
 """Of a period."""
@@ -23,17 +23,17 @@ class TorqueTask(ABC):
     def control_count(self) -> int:
         return len(self.torques)
 
-    def advance(self, X: np.ndarray, U: np.ndarray) -> np.ndarray:
-        return self.hold(X, self.torques[U], 1)
+    def substep(self, X: np.ndarray, U: np.ndarray) -> np.ndarray:
+        return self.integrate(X, self.torques[U], 1)
 
     def step(self, X: np.ndarray, U: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         torques = self.torques[U]
-        return self.hold(X, torques), self.cost(X, torques), np.zeros(len(X), bool)
+        return self.integrate(X, torques), self.cost(X, torques), np.zeros(len(X), bool)
 
     @abstractmethod
     def cost(self, X: np.ndarray, torques: np.ndarray) -> np.ndarray:
         """l (k,) of a step from X (k, nx) under any torques (k, motors) [N m]."""
 
     @abstractmethod
-    def hold(self, X: np.ndarray, torques: np.ndarray, parts: int = SUBSTEPS) -> np.ndarray:
+    def integrate(self, X: np.ndarray, torques: np.ndarray, parts: int = SUBSTEPS) -> np.ndarray:
         """X (k, nx) so many substeps later, under torques (k, motors) [N m]."""

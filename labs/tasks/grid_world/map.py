@@ -9,10 +9,10 @@ from that column. Stepping off the edge or into a wall leads nowhere: the part o
 the row comes first, then the part along the column with the wind added, each a cell at a time.
 
 A step costs `living`, 1 unless said otherwise, and what the cell costs that it leads to: nothing,
-but for + (a reward of 1), - (a cost of 1), H (FALL) and what the map says in lines below it, see
-`reading.py`. G, H, + and - are ends. A fall off the cliff costs FALL in all and leads back to the
-start. With slip, the wanted control is replaced with that probability by one of all controls, drawn
-evenly, or, `sideways`, by one of the two at right angles to it.
+but for + (a reward of 1), - (a cost of 1), H (FALL_COST) and what the map says in lines below it,
+see `map_parser.py`. G, H, + and - are ends. A fall off the cliff costs FALL_COST in all and leads
+back to the start. With slip, the wanted control is replaced with that probability by one of all
+controls, drawn evenly, or, `sideways`, by one of the two at right angles to it.
 
 Named maps: the 4x4 world, the cliff and the windy world of Sutton and Barto (Reinforcement
 Learning, 2nd edition, examples 4.1, 6.6 and 6.5), a room with walls, the 4 x 3 world of Russell
@@ -29,9 +29,9 @@ import numpy as np
 from labs.errors import LabError
 from labs.problems.finite_mdp import FiniteMDP
 from labs.tasks.grid_world.cells import CellWorld
-from labs.tasks.grid_world.reading import Kind, read_map
+from labs.tasks.grid_world.map_parser import CellKind, parse_map
 
-KINDS: Mapping[str, str] = {
+CELL_KINDS: Mapping[str, str] = {
     "#": "wall",
     ".": "free",
     "S": "start",
@@ -41,13 +41,13 @@ KINDS: Mapping[str, str] = {
     "+": "reward 1",
     "-": "cost 1",
 }
-ENDS = "GH+-"
+TERMINAL_LETTERS = "GH+-"
 MOVES = np.array([[-1, 0], [0, 1], [1, 0], [0, -1], [-1, 1], [1, 1], [1, -1], [-1, -1]])
 """(row, column) of each control: up, right, down, left; then the king's diagonals."""
-STEP, FALL = 1.0, 100.0
+STEP_COST, FALL_COST = 1.0, 100.0
 """Costs, unless said otherwise."""
-COSTS: Mapping[str, float] = {"+": -1.0, "-": 1.0, "H": FALL, "C": FALL}
-SIDE = 32
+CELL_COSTS: Mapping[str, float] = {"+": -1.0, "-": 1.0, "H": FALL_COST, "C": FALL_COST}
+MAX_SIDE = 32
 """Rows and columns at most."""
 
 MAPS: Mapping[str, str] = {
@@ -69,12 +69,12 @@ class GridWorld(CellWorld):
     """A map, and its states as cells."""
 
     rows: tuple[str, ...]
-    """The characters of KINDS and of the legend, all rows of one length."""
+    """The characters of CELL_KINDS and of the legend, all rows of one length."""
     wind: tuple[int, ...]
     """For each column [cells]."""
     kings: bool = False
     """Whether the diagonals are controls too: 8 instead of 4."""
-    legend: tuple[tuple[str, Kind], ...] = ()
+    legend: tuple[tuple[str, CellKind], ...] = ()
     """What the map says of letters."""
     notes: tuple[str, ...] = field(default=(), compare=False)
     """What was understood otherwise than written, in sentences."""
@@ -82,7 +82,7 @@ class GridWorld(CellWorld):
     @classmethod
     def parse(cls, text: str, kings: bool = False) -> "GridWorld":
         """The world of a map. Raises LabError, naming the row."""
-        found = read_map(text, KINDS, ENDS)
+        found = parse_map(text, CELL_KINDS, TERMINAL_LETTERS)
         rows = found.rows
         if not rows:
             raise LabError("a map has at least one row of cells")
@@ -98,16 +98,20 @@ class GridWorld(CellWorld):
             raise LabError(f"the wind has {len(wind)} digits: one for each of {width} columns goes")
         notes, legend = found.notes, tuple(found.legend.items())
         if "H" in "".join(rows) and "H" not in found.legend:
-            notes += (f"A hole H ends an episode and costs {FALL:g}; H = cost 0 below the map: 0.",)
-        return cls(tuple(rows), wind, kings, legend, notes)._checked()
+            notes += (
+                f"A hole H ends an episode and costs {FALL_COST:g}; H = cost 0 below the map: 0.",
+            )
+        return cls(tuple(rows), wind, kings, legend, notes)._validate()
 
-    def _checked(self) -> "GridWorld":
+    def _validate(self) -> "GridWorld":
         cells = "".join(self.rows)
-        if max(self.shape) > SIDE:
-            raise LabError(f"a map of {self.shape} cells is too large: {SIDE} x {SIDE} at most")
+        if max(self.shape) > MAX_SIDE:
+            raise LabError(
+                f"a map of {self.shape} cells is too large: {MAX_SIDE} x {MAX_SIDE} at most"
+            )
         if cells.count("S") > 1:
             raise LabError(f"the map has {cells.count('S')} starts S: one at most")
-        if not any(map(self.ends, cells)):
+        if not any(map(self.is_terminal, cells)):
             raise LabError("the map has no goal G, nor another end: at least one goes")
         if "C" in cells and "S" not in cells:
             raise LabError("the map has a cliff C but no start S for whoever falls to return to")
@@ -125,15 +129,15 @@ class GridWorld(CellWorld):
         said = [_write_kind(sign, kind) for sign, kind in self.legend]
         return "\n".join([*self.rows, *wind, *said])
 
-    def ends(self, sign: str) -> bool:
+    def is_terminal(self, sign: str) -> bool:
         """Whether an episode ends in cells of this kind."""
         kind = dict(self.legend).get(sign)
-        return kind.ends if kind else sign in ENDS
+        return kind.terminal if kind else sign in TERMINAL_LETTERS
 
     def cost(self, sign: str) -> float:
         """Of a step into a cell of this kind, beside that of any step; of a fall in all."""
         kind = dict(self.legend).get(sign)
-        return kind.cost if kind else COSTS.get(sign, 0.0)
+        return kind.cost if kind else CELL_COSTS.get(sign, 0.0)
 
     def with_cell(self, row: int, column: int, kind: str) -> "GridWorld":
         """The world with one cell of another kind; a new start takes the place of the old one,
@@ -143,7 +147,7 @@ class GridWorld(CellWorld):
         if kind == "S" or (kind == "G" and goals == 1):
             grid = [["." if cell == kind else cell for cell in line] for line in grid]
         grid[row][column] = kind
-        return replace(self, rows=tuple("".join(line) for line in grid))._checked()
+        return replace(self, rows=tuple("".join(line) for line in grid))._validate()
 
     @property
     def moves(self) -> np.ndarray:
@@ -158,7 +162,7 @@ class GridWorld(CellWorld):
     @cached_property
     def terminal(self) -> np.ndarray:
         """(X,) bool: the ends."""
-        return np.array(list(map(self.ends, self.kinds)))
+        return np.array(list(map(self.is_terminal, self.kinds)))
 
     @cached_property
     def goals(self) -> np.ndarray:
@@ -180,16 +184,17 @@ class GridWorld(CellWorld):
 
     @cached_property
     def table(self) -> tuple[np.ndarray, np.ndarray]:
-        """Without slip: successors (X, U) int32 and costs (X, U), that of a step being STEP."""
-        return self.nominal, self._costs(STEP)
+        """Without slip: successors (X, U) int32 and costs (X, U), that of a step being
+        STEP_COST."""
+        return self.nominal, self._costs(STEP_COST)
 
     @property
     def nominal(self) -> np.ndarray:
         """(X, U) int32: the next state without slip."""
-        return self._steps[0]
+        return self._nominal_steps[0]
 
     @cached_property
-    def _steps(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _nominal_steps(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Without slip: successors (X, U) int32, the cost (X, U) of the cells they are in, and
         whether it is a fall (X, U)."""
         X, U = len(self.cells), len(self.moves)
@@ -200,7 +205,7 @@ class GridWorld(CellWorld):
                 successor[x] = x
                 continue
             for u in range(U):
-                row, column = self._land(x, u)
+                row, column = self._next_cell(x, u)
                 sign = self.rows[row][column]
                 fall[x, u], cost[x, u] = sign == "C", self.cost(sign)
                 successor[x, u] = self.start if sign == "C" else self.index[row, column]
@@ -208,13 +213,13 @@ class GridWorld(CellWorld):
 
     def _costs(self, living: float) -> np.ndarray:
         """(X, U) without slip."""
-        _, cost, fall = self._steps
+        _, cost, fall = self._nominal_steps
         costs = np.where(fall, cost, living + cost)
         costs[self.terminal] = 0.0
         return costs
 
     def mdp(
-        self, gamma: float, slip: float = 0.0, sideways: bool = False, living: float = STEP
+        self, gamma: float, slip: float = 0.0, sideways: bool = False, living: float = STEP_COST
     ) -> FiniteMDP:
         """The world as an MDP; with slip in (0, 1] its dynamics are probabilities."""
         successor, cost = self.nominal, self._costs(living)
@@ -236,28 +241,29 @@ class GridWorld(CellWorld):
         mixed = (cost[:, happens] * p).sum(axis=2)
         return FiniteMDP(mixed, gamma, self.terminal, P=P, outcomes=outcomes)
 
-    def _land(self, x: int, u: int) -> tuple[int, int]:
+    def _next_cell(self, x: int, u: int) -> tuple[int, int]:
         """The cell where a step leads."""
         row, column = map(int, self.cells[x])
         down, right = map(int, self.moves[u])
         down -= self.wind[column]
-        if self._open(row, column + right):
+        if self._is_free(row, column + right):
             column += right
         for _ in range(abs(down)):
-            if not self._open(row + (1 if down > 0 else -1), column):
+            if not self._is_free(row + (1 if down > 0 else -1), column):
                 break
             row += 1 if down > 0 else -1
         return row, column
 
-    def _open(self, row: int, column: int) -> bool:
+    def _is_free(self, row: int, column: int) -> bool:
         rows, columns = self.shape
         return 0 <= row < rows and 0 <= column < columns and self.rows[row][column] != "#"
 
 
-def _write_kind(sign: str, kind: Kind) -> str:
+def _write_kind(sign: str, kind: CellKind) -> str:
     """The line of the legend that says so."""
     value = f"cost {kind.cost!r}" if kind.cost >= 0.0 else f"reward {-kind.cost!r}"
-    return f"{sign} = {value.removesuffix('.0')}{', end' if kind.ends and sign not in ENDS else ''}"
+    end = ", end" if kind.terminal and sign not in TERMINAL_LETTERS else ""
+    return f"{sign} = {value.removesuffix('.0')}{end}"
 
 
 @lru_cache(maxsize=64)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Annotated
 
 from labs.errors import LabError, ParameterError
-from labs.params import Value, readable
+from labs.params import Value, validated_by
 from labs.tasks.grid_world.map import MAPS, GridWorld, grid_world
 from labs.tasks.grid_world.picture import BOARD, board
 
@@ -23,7 +23,7 @@ BOOK_WORLDS: Mapping[str, Mapping[str, Value]] = {
     },
 }  # fmt: skip
 """The worlds of many books and courses, for labs whose params have these names."""
-MapText = Annotated[str, readable(lambda text: grid_world(text, False))]
+MapText = Annotated[str, validated_by(lambda text: grid_world(text, False))]
 """The type of a field of Params that holds a map; what is none is refused in a sentence."""
 
 

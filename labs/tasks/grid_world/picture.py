@@ -20,11 +20,11 @@ BOARD = "board"
 """The handle that a click on the board holds."""
 WALL, CLIFF, GOAL = (0.36, 0.38, 0.42), (0.55, 0.12, 0.12), (0.20, 0.66, 0.33)
 HOLE = (0.78, 0.36, 0.30)
-MANY = 200
+MAX_RAISED_WALL_STATES = 200
 """States from which on walls no longer stand out of the relief."""
-LABELLED = 80
+MAX_LABELLED_STATES = 80
 """States at most of which all that are not free have their letters on them."""
-WALKERS: tuple[Color, ...] = ("actual", "reference")
+WALKER_COLORS: tuple[Color, ...] = ("actual", "reference")
 """Of the first and the second of those side by side."""
 HEIGHT = 0.55
 """[m] of the relief at the largest value."""
@@ -107,7 +107,7 @@ def draw_board(
     relief = relief and min(world.shape) >= 2
     scene.camera(*CAMERA, core=place.around)
     scene.cells(BOARD, place.origin, place.size, _colors(world, V, heights, goals=True))
-    named = "SG+-" if len(world.cells) > LABELLED else set("".join(world.rows)) - {"."}
+    named = "SG+-" if len(world.cells) > MAX_LABELLED_STATES else set("".join(world.rows)) - {"."}
     for x, kind in enumerate(world.kinds):
         if kind in named:
             corner = place.centers[tuple(world.cells[x])] + place.size * np.array([-0.3, 0.3, 0.1])
@@ -125,7 +125,7 @@ def draw_board(
         scene.label("values", "cost-to-go V", points[0, world.shape[1] // 2] + [0.0, 0.0, 0.12])
 
 
-def draw_way(
+def draw_path(
     scene: Scene, world: CellWorld, cells: np.ndarray, which: int, name: str = "way"
 ) -> None:
     """The way through cells (k, 2), in the colour of the walker number `which`, a little beside
@@ -134,7 +134,7 @@ def draw_way(
         place = board(world)
         beside = place.size * np.array([0.1 * (which - 0.5), 0.1 * (which - 0.5), 0.15])
         points = place.centers[tuple(cells.T)] + beside
-        scene.trail(f"{name} {which + 1}", points, WALKERS[which])
+        scene.trail(f"{name} {which + 1}", points, WALKER_COLORS[which])
 
 
 def draw_walkers(scene: Scene, world: CellWorld, walk: GridWalk) -> None:
@@ -145,7 +145,9 @@ def draw_walkers(scene: Scene, world: CellWorld, walk: GridWalk) -> None:
     begin, end = (place.centers[tuple(np.minimum(at, last).T)] for at in (walk.at, walk.to))
     for m, center in enumerate((1.0 - part) * begin + part * end):
         beside = place.size * np.array([0.15 * m, 0.15 * m, 0.3])
-        scene.sphere(f"walker {m + 1}", center + beside, min(0.24 * place.size, 0.06), WALKERS[m])
+        scene.sphere(
+            f"walker {m + 1}", center + beside, min(0.24 * place.size, 0.06), WALKER_COLORS[m]
+        )
 
 
 def _heights(world: GridWorld, V: np.ndarray, low: float, high: float) -> np.ndarray:
@@ -154,8 +156,8 @@ def _heights(world: GridWorld, V: np.ndarray, low: float, high: float) -> np.nda
     around them. A cliff is a hole."""
     part = np.where(np.isfinite(V), V - low, 0.0) / (high - low)
     heights = world.on_map(np.clip(part, -0.2, 1.3) * HEIGHT)
-    walls = _is(world, "#")
-    if len(world.cells) <= MANY:
+    walls = _cells_of_kind(world, "#")
+    if len(world.cells) <= MAX_RAISED_WALL_STATES:
         return np.where(walls, HEIGHT, heights)
     around = sliding_window_view(np.pad(np.where(walls, np.nan, heights), 1, mode="edge"), (3, 3))
     counted = np.maximum(np.isfinite(around).sum(axis=(2, 3)), 1)
@@ -167,14 +169,14 @@ def _colors(world: GridWorld, V: np.ndarray, heights: np.ndarray, *, goals: bool
     colors = sequential(heights, 0.0, HEIGHT)
     colors[tuple(world.cells[~np.isfinite(V)].T)] = NO_VALUE
     for sign, color in {"#": WALL, "C": CLIFF}.items():
-        colors[_is(world, sign)] = color
+        colors[_cells_of_kind(world, sign)] = color
     if goals:
         colors[tuple(world.cells[world.terminal].T)] = HOLE
         colors[tuple(world.cells[world.goals].T)] = GOAL
     return colors
 
 
-def _is(world: GridWorld, sign: str) -> np.ndarray:
+def _cells_of_kind(world: GridWorld, sign: str) -> np.ndarray:
     """(rows, columns) bool: the cells of this kind."""
     return np.asarray(np.array([list(row) for row in world.rows]) == sign)
 

@@ -13,7 +13,7 @@ import numpy as np
 from labs.problems.finite_mdp import FiniteMDP
 from labs.tasks.grid_world.cells import CellWorld
 
-PATH = 300
+PATH_LENGTH = 300
 """Cells kept of a walk."""
 
 
@@ -28,7 +28,7 @@ class GridWalk:
     cost: np.ndarray
     """(M,) discounted cost since the start."""
     path: np.ndarray
-    """(k, M, 2) int: the cells since the start, the last PATH of them."""
+    """(k, M, 2) int: the cells since the start, the last PATH_LENGTH of them."""
     move: int
     """Periods of a step."""
     steps: int = 0
@@ -45,7 +45,7 @@ def start_walk(world: CellWorld, move: int, walkers: int = 1, start: int | None 
     return GridWalk(at, at, np.zeros(walkers), at[None], move)
 
 
-def is_on(world: CellWorld, walk: GridWalk) -> bool:
+def is_valid_walk(world: CellWorld, walk: GridWalk) -> bool:
     """Whether the cells of a walk are states of this world: its map may have changed."""
     return all(world.state(cell) >= 0 for cell in (*walk.at, *walk.to))
 
@@ -79,7 +79,7 @@ def advance_walk(walk: GridWalk) -> GridWalk:
     clock = (walk.clock + 1) % walk.move
     if clock:
         return replace(walk, clock=clock)
-    path = np.concatenate([walk.path, walk.to[None]])[-PATH:]
+    path = np.concatenate([walk.path, walk.to[None]])[-PATH_LENGTH:]
     return replace(walk, at=walk.to, path=path, clock=0)
 
 

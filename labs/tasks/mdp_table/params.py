@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Annotated
 
-from labs.params import readable
+from labs.params import validated_by
 from labs.tasks.mdp_table.table import parse_table
-from labs.tunables import LONGEST_TEXT
+from labs.tunables import MAX_TEXT_LENGTH
 
 TAXICAB = """from, action, to, probability, reward
 A, cruise, A, 1/2, 10
@@ -33,9 +33,9 @@ C, radio, B, 1/16, 0
 C, radio, C, 3/16, 8"""
 """R. A. Howard's taxicab (Dynamic Programming and Markov Processes, 1960): three towns, and in B
 no radio."""
-TABLES: Mapping[str, str] = {"Taxicab": TAXICAB}
+EXAMPLE_TABLES: Mapping[str, str] = {"Taxicab": TAXICAB}
 
-TABLE_LENGTH = LONGEST_TEXT
+TABLE_LENGTH = MAX_TEXT_LENGTH
 """Characters: 100 states in wide form, and the dictionary P of FrozenLake's 64."""
-TableText = Annotated[str, readable(parse_table)]
+TableText = Annotated[str, validated_by(parse_table)]
 """The type of a field of Params that holds a table; what is none is refused in a sentence."""

@@ -9,7 +9,7 @@ from labs.scene import Scene
 from labs.tasks.grid_world.picture import CAMERA, LIFT, WALL, board
 from labs.tasks.mdp_table.world import TableWorld
 
-LABELLED = 40
+MAX_LABELLED_STATES = 40
 """States at most that have their names beside them."""
 
 
@@ -31,7 +31,7 @@ def draw_states(
         corner = centers[x] - 0.45 * place.size * np.array([1.0, 1.0, 0.0])
         tint = colors[x : x + 1, None]
         scene.cells(f"state {x + 1}", corner, 0.9 * place.size, tint, clickable=False)
-        if len(centers) <= LABELLED:
+        if len(centers) <= MAX_LABELLED_STATES:
             does = "" if policy is None or world.terminal[x] else table.control(x, int(policy[x]))
             text = f"{table.states[x]}: {does}" if does else table.states[x]
             scene.label(f"name {x + 1}", text, centers[x] - (0.0, 0.3 * place.size, 0.0))

@@ -1,5 +1,5 @@
-"""Finite Markov decision processes written down as tables (how: `reading.py`), with the names of
-their states and controls.
+"""Finite Markov decision processes written down as tables (how: `table_parser.py`), with the names
+of their states and controls.
 """
 
 from collections.abc import Iterable, Sequence
@@ -10,13 +10,13 @@ import numpy as np
 
 from labs.errors import LabError
 from labs.problems.finite_mdp import FiniteMDP
-from labs.tasks.mdp_table.reading import TableRow, read_entries
+from labs.tasks.mdp_table.table_parser import TableRow, read_rows
 
 SUM_TOLERANCE = 1e-6
 """How far a row may be from summing to 1: somebody wrote 0.333333."""
 MAX_STATES, MAX_CONTROLS = 100, 20
 """Of a table."""
-NAMED = 12
+MAX_NAMED_STATES = 12
 """States at most that a message lists."""
 
 
@@ -31,7 +31,7 @@ class MdpTable:
     """(U, X, X) probabilities of the next state."""
     C: np.ndarray
     """(X, U) costs."""
-    has: np.ndarray
+    control_index: np.ndarray
     """(X, U) int: the control itself, or where a state does not have it the one in its place."""
     notes: tuple[str, ...] = ()
     """What was understood otherwise than written, in sentences."""
@@ -46,7 +46,7 @@ class MdpTable:
     @property
     def available(self) -> np.ndarray:
         """(X, U) bool: which controls a state has."""
-        return np.asarray(self.has == np.arange(len(self.controls)))
+        return np.asarray(self.control_index == np.arange(len(self.controls)))
 
     def mdp(self, gamma: float) -> FiniteMDP:
         """As arrays for the algorithms."""
@@ -55,14 +55,14 @@ class MdpTable:
 
     def control(self, x: int, u: int) -> str:
         """The name of what control u of state x does."""
-        return self.controls[int(self.has[x, u])]
+        return self.controls[int(self.control_index[x, u])]
 
 
 @lru_cache(maxsize=16)
 def parse_table(text: str, most: int = MAX_STATES) -> MdpTable:
     """The table of at most `most` states a text holds, CSV or JSON. Raises LabError with the row
     that is wrong, what it says and what is allowed."""
-    entries, notes = read_entries(text)
+    entries, notes = read_rows(text)
     if not entries:
         raise LabError("the table has no rows: it needs one for each state")
     named = dict.fromkeys(entry.state for entry in entries)
@@ -75,14 +75,14 @@ def parse_table(text: str, most: int = MAX_STATES) -> MdpTable:
     if ends:
         have, which = ("has", "it") if len(ends) == 1 else ("have", "them")
         notes += (f"{', '.join(ends)} {have} no row: an episode ends in {which}, at no cost.",)
-    P, C, known = _filled(entries, states, controls)
-    over = {y for entry in entries for y in entry.ends}
+    P, C, known = _assemble_matrices(entries, states, controls)
+    over = {y for entry in entries for y in entry.terminal_states}
     x = [k for k, name in enumerate(states) if name in ends or name in over]
     P[:, x], C[x], known[x] = np.eye(len(states))[x], 0.0, True
-    return MdpTable(states, controls, *_completed(P, C, known), notes)
+    return MdpTable(states, controls, *_fill_missing_controls(P, C, known), notes)
 
 
-def _filled(
+def _assemble_matrices(
     entries: Iterable[TableRow], states: Sequence[str], controls: Sequence[str]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """P, C, and which (X, U) there are rows for."""
@@ -96,9 +96,11 @@ def _filled(
         p = np.zeros(X)
         for name, value in entry.to.items():
             if name not in place:
+                known_names = ", ".join(states[:MAX_NAMED_STATES])
+                more = ", ..." * (len(states) > MAX_NAMED_STATES)
                 raise LabError(
                     f"{entry.name}: it leads to {name!r}, which has no row; "
-                    f"the states are {', '.join(states[:NAMED])}{', ...' * (len(states) > NAMED)}"
+                    f"the states are {known_names}{more}"
                 )
             p[place[name]] += value
         if not entry.long:
@@ -126,7 +128,7 @@ def _check_sum(name: str, total: float) -> None:
         )
 
 
-def _completed(
+def _fill_missing_controls(
     P: np.ndarray, C: np.ndarray, known: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """P and C with a control of its own, one after the other, where a state lacks one; and which

@@ -11,7 +11,7 @@ from labs.problems.finite_mdp import FiniteMDP
 from labs.tasks.grid_world.cells import CellWorld
 from labs.tasks.mdp_table.table import MdpTable, parse_table
 
-UNNAMED = "Here states have no names."
+NO_NAMES_NOTE = "Here states have no names."
 """In place of words about each state of a table."""
 
 
@@ -60,7 +60,7 @@ class TableWorld(CellWorld):
     def results(self, V: np.ndarray, control: np.ndarray) -> dict[str, np.ndarray]:
         """For a solution: V and controls (..., X), -1 where all are alike, with the names of the
         states (X,) and of what the controls count (U,)."""
-        own = self.table.has[np.arange(len(self.cells)), np.maximum(control, 0)]
+        own = self.table.control_index[np.arange(len(self.cells)), np.maximum(control, 0)]
         return {
             "V": V,
             "greedy_control": np.where(control < 0, control, own),

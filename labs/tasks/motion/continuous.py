@@ -19,13 +19,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from labs.errors import LabError
-from labs.models.coordinates import names_in_sentences
+from labs.models.coordinates import state_and_control_names
 from labs.models.mechanisms import mechanism
 from labs.problems.continuous_control import ContinuousProblem
 from labs.tasks.motion.continuous_cost import ContinuousMotionCost, SoftLimits
 from labs.tasks.motion.cost import TipCost
 from labs.tasks.motion.motions import MOTIONS, RAIL_VIEW, MotionTask, MotionWeights
-from labs.tasks.motion.tip_constraints import AtTarget, Ball, OutsideBalls
+from labs.tasks.motion.tip_constraints import Ball, ObstacleConstraint, TipTargetConstraint
 
 CONTINUOUS_MOTIONS: Mapping[str, MotionTask] = {
     "mass": MotionTask("Mass on a line", (1.0,), (1.0,), RAIL_VIEW),
@@ -87,7 +87,7 @@ def continuous_motion(
     if limits.q_upper:
         x_upper[:n] = limits.q_upper
     x_lower[n:], x_upper[n:] = -limits.velocity, limits.velocity
-    path = OutsideBalls(system, limits.obstacles) if limits.obstacles else None
+    path = ObstacleConstraint(system, limits.obstacles) if limits.obstacles else None
     soft = None
     if limits.soft_weight is not None:
         soft = SoftLimits(limits.soft_weight, x_lower, x_upper, path)
@@ -98,7 +98,7 @@ def continuous_motion(
         if motion.goal:
             x_final[:n] = motion.goal
         elif target is not None:
-            end = AtTarget(system, target)
+            end = TipTargetConstraint(system, target)
         if objective != "fastest-end":
             x_final[n:] = 0.0
     bound = limits.control * u_0
@@ -115,7 +115,7 @@ def continuous_motion(
         T_limits,
         path,
         end,
-        *names_in_sentences(system),
+        *state_and_control_names(system),
     )
 
 
@@ -130,7 +130,7 @@ def _cost(
     n, u_0 = system.nq, np.array(motion.control_scale)
     per_control, nothing = np.diag(1.0 / u_0**2), np.zeros((2 * n, 2 * n))
     x_ref = np.concatenate([motion.goal or system.arm.home, np.zeros(n)])
-    u_ref, c = system.holding(system.arm.home), np.zeros(2 * n)
+    u_ref, c = system.equilibrium_control(system.arm.home), np.zeros(2 * n)
     if objective == "weighted":
         tip_cost = None
         if not motion.goal and target is not None:

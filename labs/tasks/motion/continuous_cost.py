@@ -26,7 +26,7 @@ class SoftLimits:
 
     def value(self, X: np.ndarray) -> np.ndarray:
         """(k,)"""
-        excess = self._beyond(X)
+        excess = self._excess(X)
         found = (excess**2).sum(axis=1)
         if self.path:
             found += (np.maximum(self.path.values(X), 0.0) ** 2).sum(axis=1)
@@ -34,7 +34,7 @@ class SoftLimits:
 
     def derivatives(self, X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Gradients (k, nx), and Hessians (k, nx, nx) without the curvature of g."""
-        excess = self._beyond(X)
+        excess = self._excess(X)
         gradient = 2.0 * self.weight * excess
         hessian = np.zeros((*X.shape, X.shape[1]))
         diagonal = np.arange(X.shape[1])
@@ -46,7 +46,7 @@ class SoftLimits:
             hessian += 2.0 * self.weight * np.einsum("ksi,ksj->kij", missed, J)
         return gradient, hessian
 
-    def _beyond(self, X: np.ndarray) -> np.ndarray:
+    def _excess(self, X: np.ndarray) -> np.ndarray:
         return np.asarray(np.maximum(X - self.upper, 0.0) + np.minimum(X - self.lower, 0.0))
 
 

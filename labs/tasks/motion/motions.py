@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labs.errors import LabError
-from labs.models.discrete import Discrete
+from labs.models.discrete import DiscreteMechanism
 from labs.models.mechanisms import Mechanism, mechanism
 from labs.problems.optimal_control import OptimalControlProblem
 from labs.shapes import Vector3
@@ -98,27 +98,27 @@ def motion_problem(
         R=h * np.diag(weights.control / u_0**2),
         Q_f=np.diag(np.repeat([0.0 if tip_cost else weights.goal, weights.rest], n)),
         x_ref=np.concatenate([motion.goal or home, at_rest]),
-        u_ref=system.holding(home),
+        u_ref=system.equilibrium_control(home),
         tip_cost=tip_cost,
     )
     bound = limit * u_0 if np.isfinite(limit) else None
     x0 = np.concatenate([home, at_rest])
-    return OptimalControlProblem(Discrete(system, h, method), cost, x0, N, bound)
+    return OptimalControlProblem(DiscreteMechanism(system, h, method), cost, x0, N, bound)
 
 
-def first_guess(
+def initial_controls(
     problem: OptimalControlProblem, u_0: np.ndarray, amplitude: float, rate: float
 ) -> np.ndarray:
     """U (N, nu) = u_ref + amplitude u_0 cos(2 pi rate t), with u_0 (nu,) and `rate` in Hz; at
     rate 0 it is a constant push. Within the bound of the problem."""
     assert isinstance(problem.cost, MotionCost)
-    assert isinstance(problem.dynamics, Discrete)
+    assert isinstance(problem.dynamics, DiscreteMechanism)
     t = problem.dynamics.h * np.arange(problem.N)
     U = problem.cost.u_ref + amplitude * np.cos(2.0 * np.pi * rate * t)[:, None] * u_0
     return clip_controls(problem, U)
 
 
-def resample(U: np.ndarray, h: float, new_h: float, N: int) -> np.ndarray:
+def resample_controls(U: np.ndarray, h: float, new_h: float, N: int) -> np.ndarray:
     """The controls (k, nu), each held for h, as N that are held for new_h; beyond their end the
     last one lasts."""
     middle = (np.arange(N) + 0.5) * new_h

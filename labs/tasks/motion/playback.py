@@ -110,7 +110,7 @@ def advance_playback(
     return replace(playback, x=x, u=u, X=X, U=U, clock=clock, diverged=diverged)
 
 
-def jump_states(playback: Playback, change: np.ndarray) -> Playback:
+def apply_state_jump(playback: Playback, change: np.ndarray) -> Playback:
     """Both runs with this sudden change (2, nx) of their states."""
     still = playback.diverged[:, None]
     return replace(playback, x=playback.x + np.where(still, 0.0, change))

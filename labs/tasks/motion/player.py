@@ -15,7 +15,7 @@ from labs.tasks.motion.playback import (
     start_playback,
 )
 
-PERIOD = 0.01
+WORLD_PERIOD = 0.01
 """[s] A step of the world."""
 REST_STEPS = 80
 """World steps between the end of a motion and its start anew: 0.8 s."""
@@ -29,13 +29,13 @@ class PlayerState(State):
     failed: bool = False
     """Whether the last solve ended without a solution."""
     playback: Playback
-    rested: int = 0
+    rest_steps: int = 0
     """World steps since the motion ended."""
-    missed: np.ndarray
+    goal_errors: np.ndarray
     """(2,) how far the tip ended from its goal [m], with feedback and in open loop, the last time;
     (0,) before it."""
     steps: int = 0
-    """World steps done: t = steps * PERIOD."""
+    """World steps done: t = steps * WORLD_PERIOD."""
 
 
 S = TypeVar("S", bound=PlayerState)
@@ -48,24 +48,24 @@ def play_from_start(state: S, plan: NominalTrajectory, failed: bool) -> S:
         plan=plan,
         failed=failed,
         playback=start_playback(plan),
-        rested=0,
-        missed=np.zeros(0),
+        rest_steps=0,
+        goal_errors=np.zeros(0),
     )
 
 
 def advance_clock(state: S) -> tuple[S, bool]:
-    """PERIOD later, and whether the motion goes on in it: at its end there is a rest, and then it
-    is at its start."""
+    """WORLD_PERIOD later, and whether the motion goes on in it: at its end there is a rest, and
+    then it is at its start."""
     steps = state.steps + 1
-    state = replace(state, t=steps * PERIOD, steps=steps)
+    state = replace(state, t=steps * WORLD_PERIOD, steps=steps)
     if not state.playback.finished(state.plan):
         return state, True
-    if state.rested < REST_STEPS:
-        return replace(state, rested=state.rested + 1), False
-    return replace(state, rested=0, playback=start_playback(state.plan)), False
+    if state.rest_steps < REST_STEPS:
+        return replace(state, rest_steps=state.rest_steps + 1), False
+    return replace(state, rest_steps=0, playback=start_playback(state.plan)), False
 
 
-def measured_runs(state: PlayerState) -> dict[str, float | np.ndarray]:
+def measure_runs(state: PlayerState) -> dict[str, float | np.ndarray]:
     """Where both runs are beside the plan, and how far they missed the goal the last time."""
     plan, playback = state.plan, state.playback
     n = plan.X.shape[1] // 2
@@ -81,6 +81,6 @@ def measured_runs(state: PlayerState) -> dict[str, float | np.ndarray]:
         "u_plan": plan.U[min(k, plan.N - 1)],
     }
     for i, suffix in ((FEEDBACK, ""), (OPEN_LOOP, "_open")):
-        if len(state.missed):
-            found[f"missed{suffix}"] = float(state.missed[i])
+        if len(state.goal_errors):
+            found[f"missed{suffix}"] = float(state.goal_errors[i])
     return found

@@ -22,7 +22,7 @@ class Ball(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class OutsideBalls:
+class ObstacleConstraint:
     """g(x) <= 0, one for each ball."""
 
     mechanism: Mechanism
@@ -34,7 +34,7 @@ class OutsideBalls:
 
     def values(self, X: np.ndarray) -> np.ndarray:
         """(k, size) [m]"""
-        places = tips(self.mechanism, X)
+        places = tip_positions(self.mechanism, X)
         gaps = [
             (ball.radius**2 - ((places - ball.center) ** 2).sum(axis=1)) / (2.0 * ball.radius)
             for ball in self.balls
@@ -43,7 +43,7 @@ class OutsideBalls:
 
     def jacobians(self, X: np.ndarray) -> np.ndarray:
         """(k, size, nx)"""
-        places, J = tips(self.mechanism, X), tip_jacobians(self.mechanism, X)
+        places, J = tip_positions(self.mechanism, X), tip_jacobians(self.mechanism, X)
         rows = [
             -np.einsum("ki,kij->kj", places - ball.center, J) / ball.radius for ball in self.balls
         ]
@@ -55,7 +55,7 @@ class OutsideBalls:
 
 
 @dataclass(frozen=True, eq=False)
-class AtTarget:
+class TipTargetConstraint:
     """e(x) = p(q) - p*, for a tip that moves in all directions."""
 
     mechanism: Mechanism
@@ -68,7 +68,7 @@ class AtTarget:
 
     def values(self, X: np.ndarray) -> np.ndarray:
         """(k, 3) [m]"""
-        return np.asarray(tips(self.mechanism, X) - self.target)
+        return np.asarray(tip_positions(self.mechanism, X) - self.target)
 
     def jacobians(self, X: np.ndarray) -> np.ndarray:
         """(k, 3, nx)"""
@@ -79,7 +79,7 @@ class AtTarget:
         return f"the tip's distance from its target along {'xyz'[i]}"
 
 
-def tips(mechanism: Mechanism, X: np.ndarray) -> np.ndarray:
+def tip_positions(mechanism: Mechanism, X: np.ndarray) -> np.ndarray:
     """p (k, 3) [m] at the states X (k, nx)."""
     return np.array([mechanism.tip(x[: mechanism.nq]) for x in X])
 

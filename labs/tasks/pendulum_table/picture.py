@@ -9,14 +9,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from labs.colors import NO_VALUE, sequential
-from labs.models.pendulums import hanging
+from labs.models.pendulums import pendulum_arm
 from labs.scene import Color, Scene
 from labs.shapes import Vector3
 from labs.tasks.pendulum_table.swing import Swing
 from labs.tasks.pendulum_table.table import PendulumGrid
 
-BALLS: tuple[Color, ...] = ("actual", "reference")
-RODS: tuple[Vector3, ...] = ((0.0, 0.41, 0.68), (0.81, 0.33, 0.0))
+BALL_COLORS: tuple[Color, ...] = ("actual", "reference")
+ROD_COLORS: tuple[Vector3, ...] = ((0.0, 0.41, 0.68), (0.81, 0.33, 0.0))
 """Of the first and the second of those side by side."""
 HEIGHT = 0.55
 """[m] of the relief at the largest value."""
@@ -61,9 +61,9 @@ def draw_table(
         scene.label(f"name {m + 1}", name, (0.0, PIVOT - ASIDE * m, 1.4))
 
 
-def draw_wires(scene: Scene, grid: PendulumGrid, V: np.ndarray, high: float) -> None:
+def draw_wireframe(scene: Scene, grid: PendulumGrid, V: np.ndarray, high: float) -> None:
     """Other values V (X,), finite, as lines over the same floor, to compare with a relief."""
-    points = _place(grid, grid.nodes.reshape(*grid.shape, 2))
+    points = _floor_position(grid, grid.nodes.reshape(*grid.shape, 2))
     points[..., 2] += np.clip(V.reshape(grid.shape) / high, -0.2, 1.3) * HEIGHT
     scene.trail("wires", points.transpose(1, 0, 2)[::3] + ABOVE, "reference", 0.7)
 
@@ -71,7 +71,7 @@ def draw_wires(scene: Scene, grid: PendulumGrid, V: np.ndarray, high: float) -> 
 def _draw_relief(scene: Scene, grid: PendulumGrid, heights: np.ndarray, known: np.ndarray) -> None:
     stride = max(1, -(-grid.q_nodes // MESH))
     some = (slice(None, None, stride), slice(None, None, stride))
-    points = _place(grid, grid.nodes.reshape(*grid.shape, 2)[some])
+    points = _floor_position(grid, grid.nodes.reshape(*grid.shape, 2)[some])
     points[..., 2] += heights[some]
     colors = sequential(heights[some], 0.0, HEIGHT)
     colors[~known[some]] = NO_VALUE
@@ -82,7 +82,7 @@ def _draw_relief(scene: Scene, grid: PendulumGrid, heights: np.ndarray, known: n
         ("back", f"v = {fast:g} rad/s", corner, fast),
         ("middle", "upright", np.pi, -fast),
     ):
-        above = np.array([0.0, 0.0, 0.08]) + _on_relief(grid, heights, np.array([[q, v]]))[0]
+        above = np.array([0.0, 0.0, 0.08]) + _relief_position(grid, heights, np.array([[q, v]]))[0]
         scene.label(name, text, above)
 
 
@@ -100,7 +100,7 @@ def _draw_policy(
     if known is not None:
         some = some[known[some]]
     ahead = grid.successor[some, policy[some].astype(int)]
-    starts, ends = (_on_relief(grid, heights, grid.nodes[x]) for x in (some, ahead))
+    starts, ends = (_relief_position(grid, heights, grid.nodes[x]) for x in (some, ahead))
     near = np.abs(ends[:, 1] - starts[:, 1]) < ALONG / 2  # not across the seam
     starts, ways = starts[near], (ends - starts)[near]
     lengths = np.linalg.norm(ways, axis=1, keepdims=True)
@@ -114,7 +114,7 @@ def _draw_pendulum(
     """A pendulum with its torque, its state, and the way that came to since it last passed the
     seam of the relief."""
     pivot = PIVOT - ASIDE * m
-    scene.arm(f"pendulum {m + 1}", hanging(1, (0.0, pivot), RODS[m]), swing.at[m, :1])
+    scene.arm(f"pendulum {m + 1}", pendulum_arm(1, (0.0, pivot), ROD_COLORS[m]), swing.at[m, :1])
     tau = float(swing.torque[m])
     if tau:
         angle = 0.9 * np.pi * np.clip(tau / FULL_TORQUE, -1.0, 1.0)
@@ -122,15 +122,18 @@ def _draw_pendulum(
     turns = swing.path[:, m, 0] // (2 * np.pi)
     passed = np.flatnonzero(np.diff(turns))
     since = int(passed[-1]) + 1 if len(passed) else 0
-    way = _on_relief(grid, heights, swing.path[since:, m])
+    way = _relief_position(grid, heights, swing.path[since:, m])
     if len(way) >= 2:
-        scene.trail(f"way {m + 1}", way, BALLS[m])
+        scene.trail(f"way {m + 1}", way, BALL_COLORS[m])
     scene.sphere(
-        f"state {m + 1}", _on_relief(grid, heights, swing.at[m : m + 1])[0], 0.035, BALLS[m]
+        f"state {m + 1}",
+        _relief_position(grid, heights, swing.at[m : m + 1])[0],
+        0.035,
+        BALL_COLORS[m],
     )
 
 
-def _place(grid: PendulumGrid, x: np.ndarray) -> np.ndarray:
+def _floor_position(grid: PendulumGrid, x: np.ndarray) -> np.ndarray:
     """(..., 3) [m]: where (q, v) (..., 2) is on the floor under the relief; q wrapped about
     upright."""
     angle = x[..., 0] % (2 * np.pi) - np.pi
@@ -138,9 +141,9 @@ def _place(grid: PendulumGrid, x: np.ndarray) -> np.ndarray:
     return np.stack([-ACROSS / 2 * x[..., 1] / grid.v_max, y, np.full(y.shape, 0.05)], axis=-1)
 
 
-def _on_relief(grid: PendulumGrid, heights: np.ndarray, x: np.ndarray) -> np.ndarray:
+def _relief_position(grid: PendulumGrid, heights: np.ndarray, x: np.ndarray) -> np.ndarray:
     """(k, 3) [m]: states (k, 2) on the relief."""
     clipped = np.stack([x[:, 0], np.clip(x[:, 1], -grid.v_max, grid.v_max)], axis=1)
-    places: np.ndarray = _place(grid, clipped) + ABOVE
+    places: np.ndarray = _floor_position(grid, clipped) + ABOVE
     places[:, 2] += heights.ravel()[grid.state(x[:, :1], x[:, 1:])]
     return places

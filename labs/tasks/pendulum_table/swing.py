@@ -11,7 +11,7 @@ import numpy as np
 from labs.problems.finite_mdp import FiniteMDP
 from labs.tasks.pendulum_table.table import PendulumGrid, integrate_pendulum
 
-PATH = 300
+PATH_LENGTH = 300
 """States kept of a motion."""
 
 
@@ -28,7 +28,7 @@ class Swing:
     cost: np.ndarray
     """(M,) discounted cost since the start."""
     path: np.ndarray
-    """(k, M, 2): the states since the start, the last PATH of them."""
+    """(k, M, 2): the states since the start, the last PATH_LENGTH of them."""
     steps: int = 0
     """Decisions since the start."""
     clock: int = 0
@@ -58,24 +58,24 @@ def look_up_torques(
 
 def advance_swing(grid: PendulumGrid, swing: Swing, period: float) -> Swing:
     """One period [s] later."""
-    return _integrated(grid, swing, period, (swing.clock + 1) % round(grid.dt / period))
+    return _integrate(grid, swing, period, (swing.clock + 1) % round(grid.dt / period))
 
 
-def coast(grid: PendulumGrid, swing: Swing, period: float) -> Swing:
+def advance_unpowered(grid: PendulumGrid, swing: Swing, period: float) -> Swing:
     """One period [s] later, the motors off; a decision is due then."""
-    return _integrated(grid, replace(swing, torque=np.zeros(len(swing.at))), period, 0)
+    return _integrate(grid, replace(swing, torque=np.zeros(len(swing.at))), period, 0)
 
 
-def push(swing: Swing, change: float) -> Swing:
+def change_velocity(swing: Swing, change: float) -> Swing:
     """With another velocity, by so much [rad/s]."""
     at = swing.at + np.array([0.0, change])
     return replace(swing, at=at, to=at)
 
 
-def _integrated(grid: PendulumGrid, swing: Swing, period: float, clock: int) -> Swing:
+def _integrate(grid: PendulumGrid, swing: Swing, period: float, clock: int) -> Swing:
     q, v = integrate_pendulum(
         swing.at[:, :1], swing.at[:, 1:], swing.torque[:, None], grid.friction, period
     )
     at = np.concatenate([q, v], axis=1)
-    path = np.concatenate([swing.path, at[None]])[-PATH:]
+    path = np.concatenate([swing.path, at[None]])[-PATH_LENGTH:]
     return replace(swing, at=at, to=swing.to if clock else at, path=path, clock=clock)

@@ -23,13 +23,13 @@ from itertools import product
 import numpy as np
 
 from labs.errors import LabError
-from labs.models.pendulums import LENGTH, MASS, RADIUS
+from labs.models.pendulums import ROD_LENGTH, ROD_MASS, ROD_RADIUS
 from labs.problems.finite_mdp import FiniteMDP
 
 GRAVITY = 9.81
 MAX_STEP = 0.025
 """[s] the longest step of integration."""
-ABOUT_CENTER = MASS * (LENGTH**2 / 12 + RADIUS**2 / 4)
+CENTER_INERTIA = ROD_MASS * (ROD_LENGTH**2 / 12 + ROD_RADIUS**2 / 4)
 """[kg m^2] moment of inertia of a rod about its centre."""
 MAX_ENTRIES = 20_000_000
 """Entries of a table, X U, at most."""
@@ -39,18 +39,18 @@ def acceleration(q: np.ndarray, v: np.ndarray, tau: np.ndarray, friction: float)
     """q'' (..., n) [rad/s^2] of n = 1 or 2 rods at q (..., n) [rad], v (..., n) [rad/s] under
     torques tau (..., n) [N m] at the hinges."""
     force = tau - friction * v
-    half = LENGTH / 2
-    moment = ABOUT_CENTER + MASS * half**2
+    half = ROD_LENGTH / 2
+    moment = CENTER_INERTIA + ROD_MASS * half**2
     if q.shape[-1] == 1:
-        return np.asarray((force - MASS * GRAVITY * half * np.sin(q)) / moment)
+        return np.asarray((force - ROD_MASS * GRAVITY * half * np.sin(q)) / moment)
     c, s = np.cos(q[..., 1]), np.sin(q[..., 1])
-    coupling = MASS * LENGTH * half
+    coupling = ROD_MASS * ROD_LENGTH * half
     m22 = moment
     m12 = moment + coupling * c
-    m11 = 2 * moment + MASS * LENGTH**2 + 2 * coupling * c
+    m11 = 2 * moment + ROD_MASS * ROD_LENGTH**2 + 2 * coupling * c
     v1, v2 = v[..., 0], v[..., 1]
-    lower = MASS * GRAVITY * half * np.sin(q[..., 0] + q[..., 1])
-    upper = MASS * GRAVITY * (half + LENGTH) * np.sin(q[..., 0])
+    lower = ROD_MASS * GRAVITY * half * np.sin(q[..., 0] + q[..., 1])
+    upper = ROD_MASS * GRAVITY * (half + ROD_LENGTH) * np.sin(q[..., 0])
     r1 = force[..., 0] + coupling * s * v2 * (2 * v1 + v2) - upper - lower
     r2 = force[..., 1] - coupling * s * v1**2 - lower
     determinant = m11 * m22 - m12**2
@@ -172,7 +172,7 @@ class PendulumGrid:
         axes = tuple(np.moveaxis(i, -1, 0)) + tuple(np.moveaxis(j, -1, 0))
         return np.asarray(np.ravel_multi_index(axes, self.shape), dtype=np.int32)
 
-    def rows(self, chunk: int = 1 << 17) -> Iterator[tuple[slice, np.ndarray]]:
+    def successor_rows(self, chunk: int = 1 << 17) -> Iterator[tuple[slice, np.ndarray]]:
         """The table of successors piece by piece: which states, and their rows (k, U) int32."""
         for begin in range(0, self.X, chunk):
             part = slice(begin, min(begin + chunk, self.X))
@@ -188,7 +188,7 @@ class PendulumGrid:
     @cached_property
     def successor(self) -> np.ndarray:
         """(X, U) int32."""
-        return np.concatenate([rows for _, rows in self.rows()])
+        return np.concatenate([rows for _, rows in self.successor_rows()])
 
     def cost(self, w_q: float, w_v: float, w_u: float) -> np.ndarray:
         """(X, U): l(x, u) for the weights of angles, velocities and torques."""

@@ -29,9 +29,9 @@ from labs.tasks.phase_plane.systems import PlaneSystem
 
 LAYER = 0.004
 """[m] from one layer to the next."""
-HANDLE = 0.04
+HANDLE_RADIUS = 0.04
 """[m] its radius."""
-SHOWN = 1.25
+WINDOW_SCALE = 1.25
 """The window shows so many times the natural limits."""
 
 
@@ -64,7 +64,7 @@ class PhasePlane:
     ) -> Self:
         """The plane of a system, of a window about its natural limits if none is given. With a
         mass, x_1 has the scale of the rail and stands right above or before it."""
-        x_eq, reach = np.array(system.x_eq), SHOWN * np.array(system.x_max)
+        x_eq, reach = np.array(system.x_eq), WINDOW_SCALE * np.array(system.x_max)
         lower = x_eq - reach if lower is None else np.asarray(lower, float)
         upper = x_eq + reach if upper is None else np.asarray(upper, float)
         if system.body == "mass":
@@ -154,7 +154,9 @@ class PhasePlane:
         color: Vector3 = BLUE,
     ) -> None:
         """What moves, at the state x (2,)."""
-        scene.arm(name, self.system.drawn(self.body_place, color), self.system.pose(x), ghost=ghost)
+        scene.arm(
+            name, self.system.placed_body(self.body_place, color), self.system.pose(x), ghost=ghost
+        )
 
     # In the plane -----------------------------------------------------------------------------
 
@@ -244,7 +246,7 @@ class PhasePlane:
         """A state (2,), at the edge if it is beyond."""
         scene.sphere(name, self.place(np.clip(x, self.lower, self.upper)), radius, color)
 
-    def handle(self, scene: Scene, name: str, x: np.ndarray, radius: float = HANDLE) -> None:
+    def handle(self, scene: Scene, name: str, x: np.ndarray, radius: float = HANDLE_RADIUS) -> None:
         """The state (2,), at the edge if it is beyond, as a ball that is dragged."""
         scene.handle(name, self.place(np.clip(x, self.lower, self.upper)), radius)
 

@@ -19,18 +19,18 @@ from labs.algorithms.discretisation import linear_step, repeat_held
 from labs.algorithms.integrators import rk4
 from labs.errors import LabError
 from labs.models.arms import Arm
-from labs.models.mass_on_a_line import MASS, mass_on_a_line
-from labs.models.pendulums import LENGTH, RADIUS, hanging
-from labs.models.pendulums import MASS as ROD
+from labs.models.mass_on_a_line import BLOCK_MASS, mass_on_a_line
+from labs.models.pendulums import ROD_LENGTH, ROD_RADIUS, pendulum_arm
+from labs.models.pendulums import ROD_MASS as ROD
 from labs.shapes import BLUE, Vector3
 
-STEP = 0.01
+SIMULATION_STEP = 0.01
 """h [s]"""
 GRAVITY = 9.81
 """[m/s^2]"""
-INERTIA = ROD * (LENGTH**2 / 3.0 + RADIUS**2 / 4.0)
+INERTIA = ROD * (ROD_LENGTH**2 / 3.0 + ROD_RADIUS**2 / 4.0)
 """[kg m^2] of a rod about its hinge."""
-WEIGHT = 0.5 * ROD * GRAVITY * LENGTH
+GRAVITY_TORQUE = 0.5 * ROD * GRAVITY * ROD_LENGTH
 """[N m] that holds a rod level."""
 HALF_AMPLITUDE = 0.5
 """[m] beyond which the oscillator's damper pushes; its limit cycle reaches about twice as far."""
@@ -48,9 +48,9 @@ class PlaneSystem:
     body: str
     """What moves: "mass" or "pendulum"."""
     acceleration: ForcedAcceleration
-    slopes: Callable[[float], tuple[float, float]]
+    acceleration_gradients: Callable[[float], tuple[float, float]]
     """q to the derivatives of a(q, v, u) by q and by v at (q, 0)."""
-    strength: float
+    input_gain: float
     """The derivative of a by u."""
     x_max: tuple[float, float]
     """Natural limits of |x - x_eq|."""
@@ -72,37 +72,41 @@ class PlaneSystem:
     def holding(self, q: np.ndarray) -> np.ndarray:
         """u (...) that keeps q (...) at rest; of a joint the torque of gravity g(q)."""
         nothing = np.zeros_like(q)
-        return np.asarray(-self.acceleration(q, nothing, nothing) / self.strength)
+        return np.asarray(-self.acceleration(q, nothing, nothing) / self.input_gain)
 
     def step(self, X: np.ndarray, U: np.ndarray, T: float) -> np.ndarray:
         """f(x, u) (..., 2) of states X (..., 2) under controls U (..., 1) held for `T` [s]."""
         q, v, u = X[..., 0], X[..., 1], U[..., 0]
         with np.errstate(all="ignore"):
-            for _ in range(_steps(T)):
-                q, v = rk4(lambda q, v: self.acceleration(q, v, u), q, v, STEP)
+            for _ in range(_step_count(T)):
+                q, v = rk4(lambda q, v: self.acceleration(q, v, u), q, v, SIMULATION_STEP)
         return np.stack([q, v], axis=-1)
 
     def linear(self, T: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """A (2, 2), B (2, 1) and c (2,) of `step` at the rest."""
-        by_q, by_v = self.slopes(self.x_eq[0])
-        a, b = np.array([[0.0, 1.0], [by_q, by_v]]), np.array([[0.0], [self.strength]])
-        A, B = repeat_held(*linear_step("rk4", STEP, a, b), _steps(T))
+        by_q, by_v = self.acceleration_gradients(self.x_eq[0])
+        a, b = np.array([[0.0, 1.0], [by_q, by_v]]), np.array([[0.0], [self.input_gain]])
+        A, B = repeat_held(*linear_step("rk4", SIMULATION_STEP, a, b), _step_count(T))
         x_eq = np.array(self.x_eq)
         return A, B, x_eq - A @ x_eq - B[:, 0] * self.u_eq
 
-    def drawn(self, place: tuple[float, float] = (0.0, 0.0), color: Vector3 = BLUE) -> Arm:
+    def placed_body(self, place: tuple[float, float] = (0.0, 0.0), color: Vector3 = BLUE) -> Arm:
         """The body, at (x, y) = `place` [m]; the rail of the mass stays in the middle."""
-        return mass_on_a_line(place[0], color) if self.body == "mass" else hanging(1, place, color)
+        return (
+            mass_on_a_line(place[0], color)
+            if self.body == "mass"
+            else pendulum_arm(1, place, color)
+        )
 
     def pose(self, x: np.ndarray) -> np.ndarray:
         """(1,) where the body's joint is at x (2,)."""
         return np.array([x[0] + self.offset])
 
 
-def _steps(T: float) -> int:
-    steps = round(T / STEP)
-    if steps < 1 or abs(steps * STEP - T) > 1e-9:
-        raise LabError(f"T = {T} s: a period is whole steps of {STEP} s, one at least")
+def _step_count(T: float) -> int:
+    steps = round(T / SIMULATION_STEP)
+    if steps < 1 or abs(steps * SIMULATION_STEP - T) > 1e-9:
+        raise LabError(f"T = {T} s: a period is whole steps of {SIMULATION_STEP} s, one at least")
     return steps
 
 
@@ -115,9 +119,9 @@ def _cart() -> PlaneSystem:
         "cart",
         "Cart between walls",
         "mass",
-        lambda q, v, u: u / MASS + 0.0 * q,
+        lambda q, v, u: u / BLOCK_MASS + 0.0 * q,
         lambda q: (0.0, 0.0),
-        1.0 / MASS,
+        1.0 / BLOCK_MASS,
         (1.0, 1.0),
         1.0,
         **METRES,  # type: ignore[arg-type]
@@ -129,8 +133,8 @@ def _unstable() -> PlaneSystem:
         "unstable",
         "Pendulum, upright",
         "pendulum",
-        lambda q, v, u: (u + WEIGHT * np.sin(q)) / INERTIA,
-        lambda q: (WEIGHT * np.cos(q) / INERTIA, 0.0),
+        lambda q, v, u: (u + GRAVITY_TORQUE * np.sin(q)) / INERTIA,
+        lambda q: (GRAVITY_TORQUE * np.cos(q) / INERTIA, 0.0),
         1.0 / INERTIA,
         (0.5, 3.0),
         2.0,
@@ -144,8 +148,8 @@ def _joint() -> PlaneSystem:
         "joint",
         "Joint with gravity",
         "pendulum",
-        lambda q, v, u: (u - WEIGHT * np.sin(q)) / INERTIA,
-        lambda q: (-WEIGHT * np.cos(q) / INERTIA, 0.0),
+        lambda q, v, u: (u - GRAVITY_TORQUE * np.sin(q)) / INERTIA,
+        lambda q: (-GRAVITY_TORQUE * np.cos(q) / INERTIA, 0.0),
         1.0 / INERTIA,
         (1.2, 4.0),
         8.0,
@@ -158,9 +162,9 @@ def _oscillator() -> PlaneSystem:
         "oscillator",
         "Van der Pol, reversed",
         "mass",
-        lambda q, v, u: u / MASS - q - (1.0 - (q / HALF_AMPLITUDE) ** 2) * v,
+        lambda q, v, u: u / BLOCK_MASS - q - (1.0 - (q / HALF_AMPLITUDE) ** 2) * v,
         lambda q: (-1.0, (q / HALF_AMPLITUDE) ** 2 - 1.0),
-        1.0 / MASS,
+        1.0 / BLOCK_MASS,
         (1.2, 1.5),
         1.0,
         **METRES,  # type: ignore[arg-type]

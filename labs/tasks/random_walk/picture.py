@@ -13,18 +13,18 @@ from labs.tasks.random_walk.walks import WalkShape
 
 ROW = "walk"
 """The handle that a click on the row holds."""
-WIDTH, LARGEST = 3.0, 0.36
+WIDTH, MAX_CELL_SIZE = 3.0, 0.36
 """[m] of a row, and of a cell at most."""
 HEIGHT, FLOOR = 0.7, 0.16
 """[m] of the bars from the least to the largest value, and where the least one is."""
-BEYOND = 0.25
+CLIP_MARGIN = 0.25
 """Part of that range that a bar may reach beyond it."""
-BARS: tuple[Color, ...] = ("actual", "reference")
+BAR_COLORS: tuple[Color, ...] = ("actual", "reference")
 """Of the first and the second learner of those side by side."""
 INSIDE, FREE = (0.82, 0.84, 0.87), (0.62, 0.63, 0.65)
 GAIN, LOSS = (0.20, 0.66, 0.33), (0.75, 0.22, 0.17)
 """sRGB of cells: between the ends; an end that costs nothing, one that gains, one that costs."""
-LETTERS, NAMED = 26, 9
+LETTERS, MAX_NAMED_STATES = 26, 9
 """States that have a letter each, more of them have numbers; and names that stand under the row."""
 
 
@@ -36,7 +36,7 @@ def state_names(walk: WalkShape) -> tuple[str, ...]:
 
 def cell_size(walk: WalkShape) -> float:
     """[m]"""
-    return min(LARGEST, WIDTH / (walk.states + 2))
+    return min(MAX_CELL_SIZE, WIDTH / (walk.states + 2))
 
 
 def cell_places(walk: WalkShape) -> np.ndarray:
@@ -59,7 +59,7 @@ def value_heights(walk: WalkShape, V: np.ndarray) -> np.ndarray:
     """(...) [m] above the floor of values V (...); what is far beyond the ends' costs is cut."""
     low, high = min(walk.left, walk.right, 0.0), max(walk.left, walk.right, 0.0)
     part = (V - low) / ((high - low) or 1.0)
-    return np.asarray(FLOOR + HEIGHT * np.clip(part, -BEYOND, 1.0 + BEYOND))
+    return np.asarray(FLOOR + HEIGHT * np.clip(part, -CLIP_MARGIN, 1.0 + CLIP_MARGIN))
 
 
 def draw_walk(
@@ -84,7 +84,7 @@ def draw_walk(
     corner = places[0] - [0.5 * size, 0.5 * size, 0.0]
     scene.cells(ROW, corner, size, tints[None], clickable=clickable)
     front = np.array([0.0, -0.5 * size - 0.1, 0.0])
-    every = -(-n // NAMED)
+    every = -(-n // MAX_NAMED_STATES)
     for name, cell in zip(state_names(walk)[::every], places[1:-1:every], strict=True):
         scene.label(f"state {name}", name, cell + front)
     for side, end, cost in zip(("left", "right"), (0, -1), ends, strict=True):
@@ -122,7 +122,7 @@ def draw_values(
         tops = value_heights(walk, V[1:-1])
         for name, a, b, z in zip(state_names(walk), left, right, tops, strict=True):
             corners = [(a, 0.0, zero), (b, 0.0, zero), (b, 0.0, z), (a, 0.0, z)]
-            scene.polygon(f"value {m + 1} of {name}", np.array(corners), BARS[m], 0.85)
+            scene.polygon(f"value {m + 1} of {name}", np.array(corners), BAR_COLORS[m], 0.85)
         if m < len(spread):
             ends = [value_heights(walk, (V + s * spread[m])[1:-1]) for s in (-1.0, 1.0)]
             middle = 0.5 * (left + right)

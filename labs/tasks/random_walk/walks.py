@@ -19,11 +19,11 @@ from typing import NamedTuple
 import numpy as np
 
 from labs.algorithms.policy_evaluation import expected_visits
-from labs.algorithms.prediction import on_policy
+from labs.algorithms.prediction import on_policy_task
 from labs.problems.finite_mdp import FiniteMDP, random_policy
 from labs.problems.prediction import PredictionTask
 
-HORIZON = 50_000
+MAX_STEPS = 50_000
 """Steps: beyond what any walk here takes."""
 
 
@@ -45,9 +45,9 @@ class WalkShape(NamedTuple):
         return (self.states + 1) // 2
 
 
-FIVE = WalkShape(5, 0.0, -1.0)
-NINETEEN = WalkShape(19, 1.0, -1.0)
-THOUSAND = WalkShape(1000, 1.0, -1.0, reach=100)
+FIVE_STATE_WALK = WalkShape(5, 0.0, -1.0)
+NINETEEN_STATE_WALK = WalkShape(19, 1.0, -1.0)
+THOUSAND_STATE_WALK = WalkShape(1000, 1.0, -1.0, reach=100)
 
 
 def walk_mdp(walk: WalkShape) -> FiniteMDP:
@@ -68,10 +68,10 @@ def walk_mdp(walk: WalkShape) -> FiniteMDP:
 def walk_task(walk: WalkShape) -> PredictionTask:
     """Prediction of the even policy from the start in the middle."""
     mdp = walk_mdp(walk)
-    return on_policy(mdp, random_policy(mdp), [walk.start], HORIZON)
+    return on_policy_task(mdp, random_policy(mdp), [walk.start], MAX_STEPS)
 
 
-def visit_share(walk: WalkShape) -> np.ndarray:
+def on_policy_distribution(walk: WalkShape) -> np.ndarray:
     """(n + 2,) mu: the share of all steps that begin in each state, 0 at the ends."""
     mdp = walk_mdp(walk)
     visits = expected_visits(mdp, random_policy(mdp), walk.start)

@@ -11,7 +11,7 @@ import numpy as np
 from labs.models.mechanisms import Mechanism
 from labs.problems.continuous_control import ContinuousProblem
 from labs.tasks.motion.continuous_cost import ContinuousMotionCost
-from labs.tasks.motion.tip_constraints import AtTarget, OutsideBalls
+from labs.tasks.motion.tip_constraints import ObstacleConstraint, TipTargetConstraint
 from tests.labs.algorithms.ipopt_oracle import BARRIER, inverse_dynamics, tip_position
 
 
@@ -129,11 +129,11 @@ def ipopt(
         off = tip(s[:n]) - cost.tip_cost.target
         J += cost.tip_cost.rho * ca.dot(off, off)
     if problem.end:
-        assert isinstance(problem.end, AtTarget)
+        assert isinstance(problem.end, TipTargetConstraint)
         c.append(tip(s[:n]) - problem.end.target)
     g = []
     if problem.path:
-        assert isinstance(problem.path, OutsideBalls)
+        assert isinstance(problem.path, ObstacleConstraint)
         for x in nodes:
             for ball in problem.path.balls:
                 off = tip(x[:n]) - ball.center

@@ -9,7 +9,7 @@ import casadi as ca
 import numpy as np
 import pinocchio as pin
 
-from labs.models.discrete import Discrete
+from labs.models.discrete import DiscreteMechanism
 from labs.models.mechanisms import Mechanism
 from labs.problems.optimal_control import OptimalControlProblem
 from labs.tasks.motion.cost import MotionCost
@@ -99,7 +99,7 @@ def optimum(
     """Of the local minimum near X (N + 1, nx), U (N, nu), where Ipopt starts: well within the
     bounds, or if `warm`, right there, with a small barrier."""
     plant, cost, N = problem.dynamics, problem.cost, problem.N
-    assert isinstance(plant, Discrete)
+    assert isinstance(plant, DiscreteMechanism)
     assert isinstance(cost, MotionCost)
     m, h, n = plant.mechanism, plant.h, plant.mechanism.nq
     tau, many = inverse_dynamics(m.model), STAGES[plant.method]

@@ -35,7 +35,9 @@ def grid(name: str, slip: float = 0.0, horizon: int = 500) -> tuple[GridWorld, E
     return world, episodic_task(world.mdp(1.0, slip), [world.start], horizon)
 
 
-def fresh(experience: EpisodicTask, seeds: int = 1, seed: int = 0, q0: float = 0.0) -> Learners:
+def initial_learners(
+    experience: EpisodicTask, seeds: int = 1, seed: int = 0, q0: float = 0.0
+) -> Learners:
     states, controls = experience.cost.shape
     return init((states, controls), seeds, np.random.default_rng(seed), q0)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from qpsolvers import Problem, solve_problem
 
-from labs.algorithms.riccati import steady_state_directly
+from labs.algorithms.riccati import steady_state_by_scipy
 from labs.problems.linear_mpc import LinearMpcProblem
 from labs.problems.polyhedron import Polyhedron, box
 
@@ -23,7 +23,7 @@ DOUBLE_INTEGRATOR = LinearMpcProblem(
 
 def riccati(problem: LinearMpcProblem) -> tuple[np.ndarray, np.ndarray]:
     """P and K of the problem's matrices."""
-    found = steady_state_directly(problem.A, problem.B, problem.Q, problem.R)
+    found = steady_state_by_scipy(problem.A, problem.B, problem.Q, problem.R)
     return found.value, found.gain
 
 

@@ -14,21 +14,21 @@ from labs.algorithms.approximation import (
     SEMI_GRADIENT_TD,
     TDC,
     LinearPredictors,
-    best_fit,
+    expected_td_update,
     init,
-    mean_update,
     step,
     td_fixed_point,
+    weighted_least_squares,
 )
 from labs.algorithms.features import (
     Features,
-    aggregation,
-    fourier,
-    from_matrix,
-    polynomials,
-    table,
-    tiles,
-    vanishing,
+    features_from_matrix,
+    fourier_basis,
+    polynomial_basis,
+    state_aggregation,
+    tabular_features,
+    tile_coding,
+    zero_features_at,
 )
 from labs.errors import LabError
 from labs.problems.episodes import UpdateRule
@@ -36,9 +36,9 @@ from labs.problems.finite_mdp import random_policy
 from labs.problems.prediction import PredictionTask
 from labs.reinforcement_learning.function_approximation.counterexamples import baird, two_states
 from labs.tasks.random_walk.walks import (
-    NINETEEN,
-    THOUSAND,
-    visit_share,
+    NINETEEN_STATE_WALK,
+    THOUSAND_STATE_WALK,
+    on_policy_distribution,
     walk_mdp,
     walk_task,
 )
@@ -49,16 +49,18 @@ LINE = np.clip((np.arange(1002.0) - 1.0) / 999.0, 0.0, 1.0)[:, None]
 @cache
 def thousand() -> PredictionTask:
     """The 1000-state walk, errors weighed by the share of visits."""
-    return walk_task(THOUSAND)._replace(weight=visit_share(THOUSAND))
+    return walk_task(THOUSAND_STATE_WALK)._replace(
+        weight=on_policy_distribution(THOUSAND_STATE_WALK)
+    )
 
 
 def groups() -> Features:
     """Ten groups of 100."""
-    return at_walk(aggregation(np.clip((np.arange(1002) - 1) // 100, 0, 9)))
+    return at_walk(state_aggregation(np.clip((np.arange(1002) - 1) // 100, 0, 9)))
 
 
 def at_walk(features: Features) -> Features:
-    return vanishing(features, thousand().task.terminal)
+    return zero_features_at(features, thousand().task.terminal)
 
 
 def begin(task: PredictionTask, features: Features, seeds: int) -> LinearPredictors:
@@ -74,7 +76,7 @@ def begin(task: PredictionTask, features: Features, seeds: int) -> LinearPredict
         (GRADIENT_MC, prediction.EVERY_VISIT, UpdateRule(0.1)),
         (SEMI_GRADIENT_TD, prediction.TD0, UpdateRule(0.1)),
         (SEMI_GRADIENT_N_STEP, prediction.N_STEP, UpdateRule(0.1, n=4)),
-        (SEMI_GRADIENT_LAMBDA, prediction.TRACES, UpdateRule(0.1, trace_decay=0.7)),
+        (SEMI_GRADIENT_LAMBDA, prediction.ELIGIBILITY_TRACES, UpdateRule(0.1, trace_decay=0.7)),
         (SEMI_GRADIENT_LAMBDA, prediction.TD0, UpdateRule(0.1, trace_decay=0.0)),
         (TDC, prediction.TD0, UpdateRule(0.1, beta=0.0)),
     ],
@@ -82,8 +84,8 @@ def begin(task: PredictionTask, features: Features, seeds: int) -> LinearPredict
 def test_with_one_feature_a_state_it_is_the_table(
     linear: int, tabular: int, rule: UpdateRule
 ) -> None:
-    task = walk_task(NINETEEN)
-    features = vanishing(table(21), task.task.terminal)
+    task = walk_task(NINETEEN_STATE_WALK)
+    features = zero_features_at(tabular_features(21), task.task.terminal)
     by_table = prediction.init(task, 3, np.random.default_rng(0))
     by_table = prediction.step(task, rule, tabular, by_table, 20)
     by_weights = step(task, features, rule, linear, begin(task, features, 3), 20)
@@ -93,8 +95,10 @@ def test_with_one_feature_a_state_it_is_the_table(
 
 @pytest.mark.parametrize("method", range(6))
 def test_learning_can_be_interrupted(method: int) -> None:
-    task = walk_task(NINETEEN)
-    features = vanishing(polynomials(np.linspace(0, 1, 21)[:, None], 3), task.task.terminal)
+    task = walk_task(NINETEEN_STATE_WALK)
+    features = zero_features_at(
+        polynomial_basis(np.linspace(0, 1, 21)[:, None], 3), task.task.terminal
+    )
     rule, start = UpdateRule(0.1, 0.5, n=3, trace_decay=0.5), begin(task, features, 3)
     whole = step(task, features, rule, method, start, 9)
     rest = step(task, features, rule, method, step(task, features, rule, method, start, 4), 5)
@@ -110,11 +114,11 @@ def test_monte_carlo_comes_to_the_best_fit_and_td_to_its_fixed_point() -> None:
     """1000 states in ten groups (figures 9.1 and 9.2 of Sutton and Barto). Both within what steps
     of this size leave; TD begins at the best fit and goes to twice its error."""
     task, features = thousand(), groups()
-    mdp, mu = walk_mdp(THOUSAND), visit_share(THOUSAND)
+    mdp, mu = walk_mdp(THOUSAND_STATE_WALK), on_policy_distribution(THOUSAND_STATE_WALK)
     even = random_policy(mdp)
     P, C = mdp.transition_matrix(even), mdp.policy_cost(even)
-    best = best_fit(task.truth, features.dense, mu)
-    fixed = td_fixed_point(*mean_update(P, C, 1.0, features.dense, mu))
+    best = weighted_least_squares(task.truth, features.dense, mu)
+    fixed = td_fixed_point(*expected_td_update(P, C, 1.0, features.dense, mu))
     mc = step(task, features, UpdateRule(2e-4), GRADIENT_MC, begin(task, features, 8), 10_000)
     oracle = step(task, features, UpdateRule(2e-3), ORACLE, begin(task, features, 4), 4000)
     np.testing.assert_allclose(oracle.w.mean(axis=0), best, atol=0.02)
@@ -145,7 +149,7 @@ def test_td_lambda_goes_from_the_td_fixed_point_to_the_best_fit() -> None:
         ).errors.mean()
         for lam, a in ((0.0, 0.05), (0.9, 0.01))
     ]
-    best = best_fit(task.truth, features.dense, task.weight)
+    best = weighted_least_squares(task.truth, features.dense, task.weight)
     least = np.sqrt(task.weight @ (features.dense @ best - task.truth) ** 2)
     assert least < found[1] < found[0]
 
@@ -156,16 +160,16 @@ def test_fourier_beats_polynomials_on_the_thousand_states() -> None:
     task = thousand()
     for order in (5, 20):
         errors = {}
-        for make, alpha in ((fourier, 5e-5), (polynomials, 1e-4)):
+        for make, alpha in ((fourier_basis, 5e-5), (polynomial_basis, 1e-4)):
             features = at_walk(make(LINE, order))
             start = begin(task, features, 10)
             learners = step(task, features, UpdateRule(alpha), GRADIENT_MC, start, 5000)
             errors[make] = learners.errors.mean()
             phi = features.dense
-            fit = phi @ best_fit(task.truth, phi, task.weight) - task.truth
+            fit = phi @ weighted_least_squares(task.truth, phi, task.weight) - task.truth
             assert np.sqrt(task.weight @ fit**2) < 0.01
-        assert errors[fourier] == pytest.approx(0.065, abs=0.02)
-        assert errors[polynomials] == pytest.approx(0.125, abs=0.03)
+        assert errors[fourier_basis] == pytest.approx(0.065, abs=0.02)
+        assert errors[polynomial_basis] == pytest.approx(0.125, abs=0.03)
 
 
 def test_many_tilings_beat_one() -> None:
@@ -173,7 +177,7 @@ def test_many_tilings_beat_one() -> None:
     episodes the one is left with the error of its steps."""
     task, errors = thousand(), {}
     for tilings in (1, 50):
-        features = at_walk(tiles(LINE, tilings, np.array([5])))
+        features = at_walk(tile_coding(LINE, tilings, np.array([5])))
         rule = UpdateRule(1e-4 / tilings)
         errors[tilings] = step(
             task, features, rule, GRADIENT_MC, begin(task, features, 4), 5000
@@ -199,7 +203,7 @@ def test_baird_s_star_diverges_under_td_and_not_under_gradient_td() -> None:
     values = cured.w @ star.features.dense.T
     assert np.abs(values - 0.99 * values[:, 6:]).max() < 0.1
     until = step(star.task, star.features, UpdateRule(0.05), SEMI_GRADIENT_TD, start, 50)
-    assert not until.sound.any()
+    assert not until.bounded.any()
     assert np.isfinite(until.w).all()
     assert np.isinf(until.errors).all()
 
@@ -208,8 +212,8 @@ def test_the_mean_update_tells_divergence_by_its_eigenvalues() -> None:
     """Of Baird's star: a real part below 0 off-policy, none on-policy."""
     star, P = baird(), baird().mdp.probabilities
     phi, mu = star.features.dense, np.full(7, 1 / 7)
-    off, _ = mean_update(P[1], np.zeros(7), 0.99, phi, mu)
-    on, _ = mean_update(P[0] * 6 / 7 + P[1] / 7, np.zeros(7), 0.99, phi, mu)
+    off, _ = expected_td_update(P[1], np.zeros(7), 0.99, phi, mu)
+    on, _ = expected_td_update(P[0] * 6 / 7 + P[1] / 7, np.zeros(7), 0.99, phi, mu)
     assert np.linalg.eigvals(off).real.min() < -0.1
     assert np.linalg.eigvals(on).real.min() > -1e-12
     same = baird(off_policy=False)
@@ -245,17 +249,17 @@ def test_w_to_two_w_diverges_beyond_its_threshold() -> None:
 
 
 def test_what_does_not_fit_is_refused() -> None:
-    task, star = walk_task(NINETEEN), baird()
-    good = vanishing(table(21), task.task.terminal)
+    task, star = walk_task(NINETEEN_STATE_WALK), baird()
+    good = zero_features_at(tabular_features(21), task.task.terminal)
     start = begin(task, good, 1)
     for features, words in (
-        (table(20), "states have features"),
-        (table(21), "terminal states all features are 0"),
+        (tabular_features(20), "states have features"),
+        (tabular_features(21), "terminal states all features are 0"),
     ):
         with pytest.raises(LabError, match=words):
             begin(task, features, 1)
     with pytest.raises(LabError, match="weights"):
-        step(task, from_matrix(np.zeros((21, 3))), UpdateRule(), TDC, start, 1)
+        step(task, features_from_matrix(np.zeros((21, 3))), UpdateRule(), TDC, start, 1)
     for rule, words in ((UpdateRule(n=0), "n = 0"), (UpdateRule(beta=-1.0), "at least 0")):
         with pytest.raises(LabError, match=words):
             step(task, good, rule, TDC, start, 1)

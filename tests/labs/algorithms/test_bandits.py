@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from labs.algorithms.bandits import SAMPLE_MEAN, Bandits, Players, gaussian_testbed, init, step
-from labs.algorithms.exploration import BOLTZMANN, CONFIDENCE, FOLLOW, THOMPSON, BehaviourPolicy
+from labs.algorithms.exploration import (
+    BOLTZMANN,
+    CONFIDENCE_BOUND,
+    FIXED_POLICY,
+    THOMPSON,
+    BehaviourPolicy,
+)
 from labs.errors import LabError
 from labs.problems.episodes import UpdateRule
 
@@ -29,7 +35,7 @@ def played(
         "epsilon 0.01": BehaviourPolicy(epsilon=0.01),
         "falling": BehaviourPolicy(epsilon=1.0, decay=0.7),
         "Boltzmann": BehaviourPolicy(BOLTZMANN, beta=4.0),
-        "bound 2": BehaviourPolicy(CONFIDENCE, bound=np.sqrt(2.0)),  # c = 2 of the book
+        "bound 2": BehaviourPolicy(CONFIDENCE_BOUND, bound=np.sqrt(2.0)),  # c = 2 of the book
         "Thompson": BehaviourPolicy(THOMPSON, bound=1.0),
     }[strategy]
     bandits = ten_arms()
@@ -64,7 +70,7 @@ def test_the_bound_may_be_measured() -> None:
     means = np.array([[-1.0, -1.5, -3.0]])
     bandits = Bandits(means, np.zeros((1, 3)))
     players = init(bandits, np.random.default_rng(4))
-    lowest = BehaviourPolicy(CONFIDENCE, bound=123.0)
+    lowest = BehaviourPolicy(CONFIDENCE_BOUND, bound=123.0)
     largest, n = 0.0, np.zeros(3)
     for t in range(1, 60):
         after = step(bandits, lowest, SAMPLE_MEAN, players, 1, measured_bound=True)
@@ -86,7 +92,7 @@ def test_playing_can_be_interrupted_and_strategies_meet_the_same_luck() -> None:
         whole = step(bandits, behaviour, UpdateRule(0.2), start, 90)
         parts = step(bandits, behaviour, UpdateRule(0.2), start, 40)
         rest = step(bandits, behaviour, UpdateRule(0.2), parts, 50)
-        for name in ("q", "visits", "means", "regret", "random", "luck"):
+        for name in ("q", "visits", "means", "regret", "random", "task_random"):
             assert np.array_equal(getattr(rest, name), getattr(whole, name)), name
         assert np.array_equal(np.hstack([parts.costs, rest.costs]), whole.costs)
     other = step(bandits, GREEDY, SAMPLE_MEAN, start, 90)
@@ -162,7 +168,7 @@ def test_what_does_not_fit_is_refused() -> None:
     bandits = ten_arms()
     players = init(bandits, np.random.default_rng(0))
     with pytest.raises(LabError, match="no other controller"):
-        step(bandits, BehaviourPolicy(FOLLOW), SAMPLE_MEAN, players, 1)
+        step(bandits, BehaviourPolicy(FIXED_POLICY), SAMPLE_MEAN, players, 1)
     with pytest.raises(LabError, match="must agree"):
         step(Bandits(np.zeros((2, 3)), np.ones((2, 3))), GREEDY, SAMPLE_MEAN, players, 1)
     with pytest.raises(LabError, match=r"both \(M, K\)"):

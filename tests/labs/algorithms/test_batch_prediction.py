@@ -5,9 +5,9 @@ import pytest
 
 from labs.algorithms.batch_prediction import (
     Batch,
-    batch_of,
+    batch_from_episodes,
     certainty_equivalence,
-    collect,
+    collect_episodes,
     empty_batch,
     least_squares,
     monte_carlo_sweep,
@@ -17,13 +17,13 @@ from labs.algorithms.prediction import EVERY_VISIT, init, step
 from labs.errors import LabError
 from labs.problems.episodes import UpdateRule
 from labs.problems.prediction import root_mean_square_error
-from labs.tasks.random_walk.walks import FIVE, walk_task
+from labs.tasks.random_walk.walks import FIVE_STATE_WALK, walk_task
 
-FIVE_TASK = walk_task(FIVE)
+FIVE_TASK = walk_task(FIVE_STATE_WALK)
 
 
 def walked(episodes: int, seeds: int = 100) -> Batch:
-    return collect(FIVE_TASK, empty_batch(7, seeds, np.random.default_rng(1)), episodes)
+    return collect_episodes(FIVE_TASK, empty_batch(7, seeds, np.random.default_rng(1)), episodes)
 
 
 def test_you_are_the_predictor() -> None:
@@ -31,7 +31,7 @@ def test_you_are_the_predictor() -> None:
     V(A) = 3/4 by TD and 0 by Monte Carlo."""
     A, B, end = 0, 1, 2
     episodes = [([A, B, end], [0.0, 0.0]), *[([B, end], [-1.0])] * 6, ([B, end], [0.0])]
-    batch = batch_of(episodes, 3, 1.0)
+    batch = batch_from_episodes(episodes, 3, 1.0)
     V = np.zeros((1, 3))
     np.testing.assert_allclose(certainty_equivalence(batch, V, 1.0)[0], [-0.75, -0.75, 0.0])
     np.testing.assert_allclose(least_squares(batch, V)[0], [0.0, -0.75, 0.0])
@@ -50,7 +50,7 @@ def test_sweeps_settle_at_the_two_answers() -> None:
 
 
 def test_what_was_never_seen_keeps_its_value() -> None:
-    batch, start = batch_of([([3, 2, 1, 0], [0.0] * 3)], 7, 1.0), np.full((1, 7), 5.0)
+    batch, start = batch_from_episodes([([3, 2, 1, 0], [0.0] * 3)], 7, 1.0), np.full((1, 7), 5.0)
     for V in (certainty_equivalence(batch, start, 1.0), least_squares(batch, start)):
         assert V[0, [4, 5, 6]].tolist() == [5.0] * 3
     assert least_squares(batch, start)[0, 1:4].tolist() == [0.0] * 3
@@ -67,7 +67,7 @@ def test_td_beats_monte_carlo_on_the_five_state_walk_at_every_size_of_batch() ->
     td: list[float] = []
     monte_carlo: list[float] = []
     for _ in range(100):
-        batch = collect(FIVE_TASK, batch, 1)
+        batch = collect_episodes(FIVE_TASK, batch, 1)
         for errors, V in (
             (td, certainty_equivalence(batch, start, 1.0)),
             (monte_carlo, least_squares(batch, start)),
@@ -82,7 +82,7 @@ def test_td_beats_monte_carlo_on_the_five_state_walk_at_every_size_of_batch() ->
 
 
 def test_collecting_can_be_interrupted() -> None:
-    whole, halves = walked(9, 3), collect(FIVE_TASK, walked(4, 3), 5)
+    whole, halves = walked(9, 3), collect_episodes(FIVE_TASK, walked(4, 3), 5)
     for name in ("visits", "transitions", "costs", "returns", "random"):
         assert np.array_equal(getattr(whole, name), getattr(halves, name))
 
@@ -90,4 +90,4 @@ def test_collecting_can_be_interrupted() -> None:
 def test_a_cut_episode_is_refused() -> None:
     short = FIVE_TASK._replace(task=FIVE_TASK.task._replace(horizon=2))
     with pytest.raises(LabError, match="cut after 2 steps"):
-        collect(short, empty_batch(7, 1, np.random.default_rng(0)), 1)
+        collect_episodes(short, empty_batch(7, 1, np.random.default_rng(0)), 1)

@@ -8,8 +8,8 @@ from labs.algorithms.chance_mpc import (
     Noise,
     back_off,
     error_covariances,
-    from_measured_state,
-    from_predicted_state,
+    nominal_from_measured_state,
+    nominal_from_predicted_state,
     stationary_covariance,
 )
 from labs.algorithms.linear_mpc import LinearPlanner
@@ -65,7 +65,7 @@ def test_planned_from_the_measured_state(probability: float) -> None:
     """One plan, with K about it: each limit at each step is broken as seldom as promised, and just
     so where the plan goes to its margin."""
     problem, noise = cart()
-    tight = from_measured_state(problem, noise, probability)
+    tight = nominal_from_measured_state(problem, noise, probability)
     plan = run_to_completion(LinearPlanner(tight).plan(np.array([-0.1, 0.2]), None))
     assert plan.found
     rng, x, active = np.random.default_rng(0), np.tile(plan.X[0], (RUNS, 1)), 0
@@ -94,7 +94,7 @@ def test_planned_from_the_predicted_state(probability: float) -> None:
     """In closed loop: never infeasible; at the wall each step is beyond it in the share of runs
     that was promised, and the share of those ever beyond keeps to Boole's bound."""
     problem, noise = cart()
-    tight = from_predicted_state(problem, noise, probability)
+    tight = nominal_from_predicted_state(problem, noise, probability)
     planner = LinearPlanner(tight)
     rng, z, plan = np.random.default_rng(0), np.array([-0.1, 0.2]), None
     x, ever, sum_of_shares, at_wall = np.tile(z, (RUNS, 1)), np.zeros(RUNS, dtype=bool), 0.0, 0
@@ -121,6 +121,6 @@ def test_what_is_refused() -> None:
     problem, noise = cart()
     for probability in (0.49, 1.0, 1.5):
         with pytest.raises(LabError, match="probability"):
-            from_measured_state(problem, noise, probability)
+            nominal_from_measured_state(problem, noise, probability)
     with pytest.raises(LabError, match="stabilise"):
-        from_predicted_state(problem, Noise(noise.covariance, np.zeros((1, 2))), 0.9)
+        nominal_from_predicted_state(problem, Noise(noise.covariance, np.zeros((1, 2))), 0.9)

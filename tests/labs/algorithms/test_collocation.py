@@ -26,18 +26,18 @@ from tests.labs.algorithms.transcriptions import (
     minimum_energy,
     minimum_time,
     regulated_mass,
-    straight,
+    straight_guess,
 )
 
 BALL = Ball(np.array([0.35, -0.1, 0.4]), 0.1)
 
 
 def solved(problem: ContinuousProblem, N: int, scheme: str, **options: Any) -> SqpIterate:
-    program, guess = Collocation(problem, N, scheme), straight(problem, N)
+    program, guess = Collocation(problem, N, scheme), straight_guess(problem, N)
     return sqp.solve(program, program.variables(guess.X, guess.U), SqpOptions(**options))
 
 
-def everything(name: str) -> ContinuousProblem:
+def fully_constrained(name: str) -> ContinuousProblem:
     """A problem with every kind of constraint."""
     limits = MotionLimits(velocity=4.0, control=0.8, obstacles=(BALL,))
     if name == "ur5":
@@ -51,7 +51,7 @@ def everything(name: str) -> ContinuousProblem:
 @pytest.mark.parametrize("name", ["cart-pole", "ur5"])
 def test_derivatives_are_those_of_finite_differences(name: str, scheme: str) -> None:
     weighted = continuous_motion(name, "weighted", 1.0, target=REACH_TARGET)
-    for problem in (everything(name), weighted):
+    for problem in (fully_constrained(name), weighted):
         program = Collocation(problem, 3, scheme)
         y = np.random.default_rng(1).normal(size=program.n)
         y[-1] = 1.3 if program.free_time else y[-1]
@@ -75,7 +75,7 @@ def test_the_pattern_is_sparse_and_the_same_everywhere(scheme: str) -> None:
     """Nonzeros grow like N, where dense matrices grow like N^2."""
     counts = []
     for N in (10, 20, 40):
-        program = Collocation(everything("cart-pole"), N, scheme)
+        program = Collocation(fully_constrained("cart-pole"), N, scheme)
         rng = np.random.default_rng(0)
         first, second = (program.derivatives(rng.normal(size=program.n)) for _ in range(2))
         np.testing.assert_array_equal(first.c_y.indices, second.c_y.indices)
@@ -110,7 +110,7 @@ def test_the_least_energy_of_the_double_integrator_is_its_closed_form(scheme: st
 def test_the_least_time_of_the_double_integrator_switches_halfway(scheme: str) -> None:
     problem = minimum_time()
     program = Collocation(problem, 40, scheme)
-    guess = straight(problem, 40)
+    guess = straight_guess(problem, 40)
     at = sqp.solve(program, program.variables(guess.X, guess.U))
     assert at.converged, at.stopped
     horizon, _, U = program.trajectory(at.y)
@@ -169,7 +169,7 @@ def reach(target: np.ndarray = REACH_TARGET, T: float = 1.0, **limits: Any) -> C
     return continuous_motion("ur5", "least-energy", T, limits=MotionLimits(**limits), target=target)
 
 
-def hasty_reach() -> ContinuousProblem:
+def short_time_reach() -> ContinuousProblem:
     return reach(T=0.6, velocity=1.6, control=0.4, obstacles=(BALL,))
 
 
@@ -199,7 +199,7 @@ LIMITED: dict[str, tuple[str, Callable[[], ContinuousProblem]]] = {
     ),
     "mass, time": ("vu", limited("mass", "least-time", 3.0, (), (), 0.8, 1.0, T_limits=(0.5, 6.0))),
     "ur5": ("qvug", partial(limited_reach, 0.2)),
-    "ur5, hasty": ("v", hasty_reach),
+    "ur5, hasty": ("v", short_time_reach),
     "ur5, time": ("vu", partial(limited_reach, 0.2, "least-time", (0.4, 1.5))),
 }  # fmt: skip
 """A problem, and of which kinds limits are active: of q, v and u, of the distance from an obstacle
@@ -225,7 +225,7 @@ def test_costs_equal_ipopts_on_the_same_discretised_problem(case: str) -> None:
     one of the UR5, and with a final time that is free and not at its limits."""
     kinds, made = LIMITED[case]
     problem, N = made(), 12 if case.startswith("ur5") else 40
-    program, guess = Collocation(problem, N, "trapezoidal"), straight(problem, N)
+    program, guess = Collocation(problem, N, "trapezoidal"), straight_guess(problem, N)
     at = sqp.solve(program, program.variables(guess.X, guess.U))
     assert at.converged, at.stopped
     found, X, U = program.trajectory(at.y)
@@ -240,7 +240,7 @@ def test_costs_equal_ipopts_on_the_same_discretised_problem(case: str) -> None:
 def test_so_do_those_of_the_other_rules(scheme: str) -> None:
     limits = MotionLimits((), (), 5.0, 0.9)
     problem = continuous_motion("pendulum", "weighted", 2.0, limits=limits)
-    program, guess = Collocation(problem, 20, scheme), straight(problem, 20)
+    program, guess = Collocation(problem, 20, scheme), straight_guess(problem, 20)
     at = sqp.solve(program, program.variables(guess.X, guess.U))
     _, X, U = program.trajectory(at.y)
     wanted = ipopt(problem, 20, scheme, X, U, warm=True)
@@ -263,7 +263,7 @@ def test_what_cannot_be_reached_is_infeasible_and_says_why() -> None:
 
 
 def test_names_say_what_and_when() -> None:
-    program = Collocation(everything("cart-pole"), 4, "trapezoidal")
+    program = Collocation(fully_constrained("cart-pole"), 4, "trapezoidal")
     fixed = Collocation(continuous_motion("cart-pole", "least-energy", 2.0), 4, "midpoint")
     assert fixed.equality_name(1) == "the start of the pole's q"
     assert fixed.equality_name(4 + 4 * 2 + 3) == "the defect of the pole's v in step 3 at t = 1 s"
@@ -278,7 +278,7 @@ def test_names_say_what_and_when() -> None:
 
 
 def test_a_trajectory_goes_in_and_comes_out() -> None:
-    problem = everything("cart-pole")
+    problem = fully_constrained("cart-pole")
     rng = np.random.default_rng(0)
     X, U = rng.normal(size=(6, 4)), rng.normal(size=(5, 1))
     for scheme in SCHEMES:
@@ -327,7 +327,7 @@ def random_problem(seed: int) -> tuple[ContinuousProblem, int, str]:
 def check_random_problem(seed: int) -> str:
     """What it ended with; where it says converged, Ipopt finds nothing better nearby."""
     problem, N, scheme = random_problem(seed)
-    program, guess = Collocation(problem, N, scheme), straight(problem, N)
+    program, guess = Collocation(problem, N, scheme), straight_guess(problem, N)
     at = sqp.solve(program, program.variables(guess.X, guess.U), SqpOptions(iterations=100))
     assert at.stopped
     if not at.converged:

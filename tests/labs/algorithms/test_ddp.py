@@ -10,7 +10,7 @@ from labs.algorithms import ddp
 from labs.algorithms.ddp import DdpOptions
 from labs.algorithms.ddp_sweep import backward_pass
 from labs.errors import LabError
-from labs.models.discrete import Discrete
+from labs.models.discrete import DiscreteMechanism
 from labs.models.mechanisms import mechanism
 from labs.problems.optimal_control import OptimalControlProblem, expand, rollout
 from labs.resumable import run_to_completion
@@ -29,13 +29,13 @@ def swing_up(name: str, N: int = 60, h: float = 0.025, r: float = 0.1) -> Optima
     final = np.diag([100.0] * n + [10.0] * n)
     R = r * h * np.eye(m.nu)
     cost = MotionCost(N, Q, R, final, np.array(UPRIGHT[name]), np.zeros(m.nu))
-    plant = Discrete(m, h, METHODS.get(name, "semi-implicit-euler"))
+    plant = DiscreteMechanism(m, h, METHODS.get(name, "semi-implicit-euler"))
     return OptimalControlProblem(plant, cost, np.zeros(2 * n), N)
 
 
 def reach(N: int = 40, h: float = 0.02) -> tuple[OptimalControlProblem, np.ndarray]:
     m = mechanism("ur5")
-    x0, holding = np.r_[m.arm.home, np.zeros(6)], m.holding(m.arm.home)
+    x0, holding = np.r_[m.arm.home, np.zeros(6)], m.equilibrium_control(m.arm.home)
     cost = MotionCost(
         N,
         np.diag([0.0] * 6 + [0.01] * 6) * h,
@@ -45,7 +45,7 @@ def reach(N: int = 40, h: float = 0.02) -> tuple[OptimalControlProblem, np.ndarr
         holding,
         TipCost(m, np.array([0.4, 0.4, 0.5]), 100.0),
     )
-    return OptimalControlProblem(Discrete(m, h), cost, x0, N), np.tile(holding, (N, 1))
+    return OptimalControlProblem(DiscreteMechanism(m, h), cost, x0, N), np.tile(holding, (N, 1))
 
 
 def guess(problem: OptimalControlProblem) -> np.ndarray:
@@ -268,7 +268,7 @@ def test_iterations_leave_what_went_before_alone() -> None:
 
 def test_a_first_guess_that_diverges_is_said() -> None:
     p = swing_up("cart-pole")
-    plant = Discrete(mechanism("cart-pole"), 0.5, "explicit-euler")
+    plant = DiscreteMechanism(mechanism("cart-pole"), 0.5, "explicit-euler")
     at = ddp.init(replace(p, dynamics=plant), np.full((60, 1), 1e5), DdpOptions())
     assert at.stopped.startswith("The first guess diverges at step ")
     assert ddp.step(p, DdpOptions(), at) is at

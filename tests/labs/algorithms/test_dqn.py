@@ -11,7 +11,7 @@ from labs.problems.environment import Environment
 from labs.random_numbers import uniform
 from labs.tasks.environments.swing_up import swing_up
 
-QUICK = DqnOptions(gamma=0.9, warm_up=100, target_every=50, epsilon_steps=2000, rate=3e-3)
+QUICK = DqnOptions(gamma=0.9, warm_up=100, target_every=50, epsilon_steps=2000, learning_rate=3e-3)
 
 
 @dataclass(frozen=True)
@@ -23,17 +23,17 @@ class Corridor:
     horizon: int = 12
     nx, observation_size, control_count, substeps = 1, 5, 2, 1
 
-    def starts(self, random: np.ndarray, many: int) -> np.ndarray:
+    def initial_states(self, random: np.ndarray, many: int) -> np.ndarray:
         return np.array([[1.0 + int(4 * uniform(random))] for _ in range(many)])
 
     def observe(self, X: np.ndarray) -> np.ndarray:
         return np.asarray(np.eye(5, dtype=np.float32)[X[:, 0].astype(int)])
 
-    def advance(self, X: np.ndarray, U: np.ndarray) -> np.ndarray:
+    def substep(self, X: np.ndarray, U: np.ndarray) -> np.ndarray:
         return np.asarray(np.clip(X + (2 * U[:, None] - 1), 0, 4))
 
     def step(self, X: np.ndarray, U: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        after = self.advance(X, U)
+        after = self.substep(X, U)
         costs = np.where((X[:, 0] == 0) & (after[:, 0] == 0), 0.0, 1.0)
         return after, costs, (after[:, 0] == 0) & (not self.endless)
 
@@ -45,7 +45,7 @@ def trained(environment: Environment, options: DqnOptions, rounds: int, seed: in
 
 @pytest.mark.parametrize(
     "options",
-    [QUICK, QUICK._replace(double=True), QUICK._replace(polyak=0.02)],
+    [QUICK, QUICK._replace(double_q_learning=True), QUICK._replace(polyak=0.02)],
     ids=["C", "double", "Polyak"],
 )
 def test_q_of_a_corridor(options: DqnOptions) -> None:
@@ -99,7 +99,7 @@ def test_without_replay_only_the_latest_are_learned_from() -> None:
     corridor = Corridor()
     agent = trained(corridor, QUICK, 100)
     spoilt = replace(agent, replay=agent.replay._replace(costs=np.full_like(agent.replay.costs, 9)))
-    latest = QUICK._replace(replays=False, update_every=8)
+    latest = QUICK._replace(experience_replay=False, update_every=8)
     one, other = (dqn.step(corridor, latest, start).w for start in (agent, spoilt))
     np.testing.assert_array_equal(one, other)
     one, other = (dqn.step(corridor, QUICK, start).w for start in (agent, spoilt))
@@ -117,7 +117,7 @@ def test_the_pendulum_is_swung_up_after_twenty_thousand_steps() -> None:
     environment = swing_up("pendulum")
     agent = dqn.init(environment, (64, 64), np.random.default_rng(0))
     options = DqnOptions(cost_scale=10.0)
-    starts = environment.starts(np.arange(1, 5, dtype=np.uint64), 50)
+    starts = environment.initial_states(np.arange(1, 5, dtype=np.uint64), 50)
     costs = []
     for _ in range(12):
         agent = dqn.step(environment, options, agent, 100)

@@ -65,11 +65,11 @@ def test_the_four_by_four_world_under_the_random_policy() -> None:
         np.testing.assert_allclose(world.on_map(sweeps[k - 1].V), wanted, atol=0.0501)
         assert sweeps[k - 1].backups == k * 16 * 4
     np.testing.assert_allclose(world.on_map(last.V), LIMIT, atol=1e-7)
-    exactly = policy_evaluation.exact(mdp, random_policy(mdp))
+    exactly = policy_evaluation.exact_values(mdp, random_policy(mdp))
     np.testing.assert_allclose(world.on_map(exactly), LIMIT, atol=1e-11)
     # The figure's last column: greedy with respect to these values is already optimal.
     greedy = q_values(mdp, exactly).argmin(axis=1)
-    np.testing.assert_allclose(policy_evaluation.exact(mdp, greedy), optimum(mdp, greedy)[0])
+    np.testing.assert_allclose(policy_evaluation.exact_values(mdp, greedy), optimum(mdp, greedy)[0])
 
 
 def gamblers_problem(p: float) -> FiniteMDP:
@@ -138,10 +138,12 @@ def test_all_ways_lead_to_the_linear_programme(mdp: FiniteMDP) -> None:
     for m in (1, 3, math.inf):
         *_, last = policy_iteration.iterate(mdp, np.zeros(mdp.X), zeros(mdp), m, 1e-10)
         np.testing.assert_allclose(last.V, wanted, atol=1e-7)
-        np.testing.assert_allclose(policy_evaluation.exact(mdp, last.policy), wanted, atol=1e-6)
+        np.testing.assert_allclose(
+            policy_evaluation.exact_values(mdp, last.policy), wanted, atol=1e-6
+        )
     exactly, policy, _ = optimum(mdp, random_policy(mdp))
     np.testing.assert_allclose(exactly, wanted, atol=1e-7)
-    np.testing.assert_allclose(policy_evaluation.exact(mdp, policy), exactly, atol=1e-12)
+    np.testing.assert_allclose(policy_evaluation.exact_values(mdp, policy), exactly, atol=1e-12)
 
 
 @pytest.mark.parametrize("slip", [0.0, 0.2])
@@ -169,7 +171,7 @@ def test_exact_evaluation_is_the_linear_system(mdp: FiniteMDP, seed: int) -> Non
     """Also where paths into cycles are followed instead."""
     policy = np.random.default_rng(seed).integers(mdp.U, size=mdp.X)
     for given_one in (policy, random_policy(mdp)):
-        V = policy_evaluation.exact(mdp, given_one)
+        V = policy_evaluation.exact_values(mdp, given_one)
         matrix, cost = mdp.transition_matrix(given_one), mdp.policy_cost(given_one)
         np.testing.assert_allclose(cost + mdp.gamma * matrix @ V, V, atol=1e-10)
 
@@ -179,12 +181,12 @@ def test_without_discount_what_never_ends_is_infinite() -> None:
     successor = np.array([[1, 3], [0, 3], [2, 2], [3, 3], [4, 4]], np.int32)
     C = np.array([[1.0, 9.0], [2.0, 4.0], [1.0, 1.0], [0.0, 0.0], [0.0, 7.0]])
     mdp = FiniteMDP(C, 1.0, np.arange(5) == 3, successor=successor)
-    circling = policy_evaluation.exact(mdp, zeros(mdp))
+    circling = policy_evaluation.exact_values(mdp, zeros(mdp))
     np.testing.assert_array_equal(circling, [np.inf, np.inf, np.inf, 0.0, 0.0])
     V, policy, _ = optimum(mdp, zeros(mdp))
     np.testing.assert_array_equal(V, [5.0, 4.0, np.inf, 0.0, 0.0])
     np.testing.assert_array_equal(policy[:2], [0, 1])
-    random = policy_evaluation.exact(mdp, random_policy(mdp))
+    random = policy_evaluation.exact_values(mdp, random_policy(mdp))
     np.testing.assert_allclose(random, [8.0 + 2 / 3, 7.0 + 1 / 3, np.inf, 0.0, np.inf])
     chance = FiniteMDP(C, 1.0, mdp.terminal, P=mdp.probabilities)
     np.testing.assert_allclose(optimum(chance, random_policy(chance))[0][:4], V[:4])
@@ -206,7 +208,7 @@ def best_sequence(mdp: FiniteMDP, final: np.ndarray, x: int, steps: int) -> floa
 def test_backward_recursion_is_the_best_of_all_sequences(seed: int) -> None:
     mdp = random_mdp(seed, X=5, U=3, gamma=0.9, deterministic=True, ends=seed % 2 == 0)
     final = np.random.default_rng(seed).normal(size=5)
-    V, policy = backward_recursion.tables(mdp, final, 5)
+    V, policy = backward_recursion.value_and_policy_tables(mdp, final, 5)
     for x in range(5):
         for k in range(6):
             assert V[k, x] == pytest.approx(best_sequence(mdp, final, x, k), abs=1e-12)
@@ -221,7 +223,7 @@ def test_backward_recursion_is_the_best_of_all_sequences(seed: int) -> None:
 def test_backward_recursion_is_the_best_of_all_policies_under_chance() -> None:
     mdp = random_mdp(3, X=3, U=2, gamma=0.95, deterministic=False, ends=False)
     final = np.array([0.3, -0.4, 0.1])
-    V, _ = backward_recursion.tables(mdp, final, 2)
+    V, _ = backward_recursion.value_and_policy_tables(mdp, final, 2)
     best = np.full(3, math.inf)
     for first, second in product(product(range(2), repeat=3), repeat=2):
         ahead = final
@@ -241,7 +243,10 @@ def test_errors_shrink_with_the_powers_of_gamma(mdp: FiniteMDP, seed: int) -> No
     policy = np.random.default_rng(seed).integers(mdp.U, size=mdp.X)
     for limit, sweeps in (
         (optimum(mdp, policy)[0], value_iteration.iterate(mdp, V, 1e-8)),
-        (policy_evaluation.exact(mdp, policy), policy_evaluation.iterate(mdp, V, policy, 1e-8)),
+        (
+            policy_evaluation.exact_values(mdp, policy),
+            policy_evaluation.iterate(mdp, V, policy, 1e-8),
+        ),
     ):
         begun = np.abs(V - limit).max()
         for sweep in sweeps:
@@ -257,7 +262,7 @@ def test_policy_iteration_gets_better_each_time(mdp: FiniteMDP, seed: int) -> No
     sweeps = policy_iteration.iterate(mdp, np.zeros(mdp.X), policy, math.inf, 1e-9)
     for sweep in sweeps:
         if sweep.evaluations == 0:
-            V = policy_evaluation.exact(mdp, sweep.policy)
+            V = policy_evaluation.exact_values(mdp, sweep.policy)
             assert np.max(V - worse) <= 1e-7
             worse = V
 
@@ -291,11 +296,11 @@ def test_an_iteration_goes_on_from_any_sweep() -> None:
 def test_few_sweeps_to_go_are_the_first_of_value_iteration() -> None:
     mdp = random_mdp(2, X=6, U=3, gamma=0.9, deterministic=True, ends=False)
     final = np.arange(6.0)
-    V, _ = backward_recursion.tables(mdp, final, 8)
+    V, _ = backward_recursion.value_and_policy_tables(mdp, final, 8)
     np.testing.assert_array_equal(V[0], final)
     for k, sweep in zip(range(1, 9), value_iteration.iterate(mdp, final, 0.0), strict=False):
         np.testing.assert_array_equal(V[k], sweep.V)
-    assert backward_recursion.tables(mdp, final, 0)[1].shape == (0, 6)
+    assert backward_recursion.value_and_policy_tables(mdp, final, 0)[1].shape == (0, 6)
 
 
 def test_an_endless_optimum_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:

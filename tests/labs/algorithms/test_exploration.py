@@ -6,14 +6,14 @@ from scipy.special import erf
 
 from labs.algorithms.exploration import (
     BOLTZMANN,
-    CONFIDENCE,
-    FOLLOW,
+    CONFIDENCE_BOUND,
+    FIXED_POLICY,
     THOMPSON,
     BehaviourPolicy,
     choose,
     greedy,
 )
-from labs.random_numbers import seeded
+from labs.random_numbers import random_states
 
 DRAWS = 20_000
 COSTS = np.array([3.0, 1.0, 2.0, 1.5])
@@ -23,13 +23,13 @@ NEVER = np.zeros(4, np.int32)
 def frequencies(
     behaviour: BehaviourPolicy, costs: np.ndarray, visits: np.ndarray = NEVER
 ) -> np.ndarray:
-    state = seeded(np.random.default_rng(0), 1)[0]
+    state = random_states(np.random.default_rng(0), 1)[0]
     drawn = [choose(behaviour, 0, costs[None], visits[None], state) for _ in range(DRAWS)]
     return np.bincount(drawn, minlength=len(costs)) / DRAWS
 
 
 def test_greedy_breaks_ties_at_random() -> None:
-    state = seeded(np.random.default_rng(0), 1)[0]
+    state = random_states(np.random.default_rng(0), 1)[0]
     costs = np.array([[2.0, 1.0, 1.0, 3.0, 1.0]])
     counts = np.bincount([greedy(costs, 0, state) for _ in range(DRAWS)], minlength=5)
     np.testing.assert_allclose(counts / DRAWS, [0, 1 / 3, 1 / 3, 0, 1 / 3], atol=0.012)
@@ -57,14 +57,14 @@ def test_boltzmann_is_a_softmax_of_minus_costs() -> None:
 
 
 def test_confidence_takes_the_lowest_bound() -> None:
-    state = seeded(np.random.default_rng(0), 1)[0]
+    state = random_states(np.random.default_rng(0), 1)[0]
     visits = np.array([40, 300, 7, 90], np.int32)
     for bound in (0.0, 0.3, 1.0, 3.0, 30.0):
         lowest = COSTS - bound * np.sqrt(2 * np.log(1 + visits.sum()) / visits)
-        behaviour = BehaviourPolicy(CONFIDENCE, bound=bound)
+        behaviour = BehaviourPolicy(CONFIDENCE_BOUND, bound=bound)
         assert choose(behaviour, 0, COSTS[None], visits[None], state) == np.argmin(lowest)
     chosen = {
-        choose(BehaviourPolicy(CONFIDENCE, bound=b), 0, COSTS[None], visits[None], state)
+        choose(BehaviourPolicy(CONFIDENCE_BOUND, bound=b), 0, COSTS[None], visits[None], state)
         for b in (0.0, 0.5, 30.0)
     }
     assert chosen == {1, 2}, "the bound changes what is chosen"
@@ -73,7 +73,7 @@ def test_confidence_takes_the_lowest_bound() -> None:
 def test_confidence_tries_the_untried_first() -> None:
     visits = np.array([5, 0, 5, 0], np.int32)
     found = frequencies(
-        BehaviourPolicy(CONFIDENCE, bound=0.0), np.array([0.0, 9.0, 0.0, 9.0]), visits
+        BehaviourPolicy(CONFIDENCE_BOUND, bound=0.0), np.array([0.0, 9.0, 0.0, 9.0]), visits
     )
     np.testing.assert_allclose(found, [0, 0.5, 0, 0.5], atol=0.012)
 
@@ -90,7 +90,7 @@ def test_exploration_fades_with_the_visits_of_a_state(decay: float) -> None:
 
 
 def test_following_another_controller() -> None:
-    behaviour = BehaviourPolicy(FOLLOW, epsilon=0.4, policy=np.array([3]))
+    behaviour = BehaviourPolicy(FIXED_POLICY, epsilon=0.4, policy=np.array([3]))
     np.testing.assert_allclose(frequencies(behaviour, COSTS), [0.1, 0.1, 0.1, 0.7], atol=0.012)
 
 

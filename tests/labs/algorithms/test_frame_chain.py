@@ -7,18 +7,18 @@ import pinocchio as pin
 import pytest
 
 from labs.algorithms.frame_chain import FrameChain, multiply_poses
-from labs.models.arms import load
+from labs.models.arms import load_arm
 
 both_robots = pytest.mark.parametrize("robot", ["ur5", "panda"])
 
 
 def chain_of(robot: str) -> FrameChain:
-    arm = load(robot)
+    arm = load_arm(robot)
     return FrameChain(arm.model, arm.tip)
 
 
 def postures(robot: str) -> Iterator[np.ndarray]:
-    model = load(robot).model
+    model = load_arm(robot).model
     rng = np.random.default_rng(5)
     low, high = model.lowerPositionLimit, model.upperPositionLimit
     yield from (rng.uniform(low, high) for _ in range(10))
@@ -26,7 +26,7 @@ def postures(robot: str) -> Iterator[np.ndarray]:
 
 @both_robots
 def test_the_product_is_the_pose_of_the_end_effector(robot: str) -> None:
-    arm, chain = load(robot), chain_of(robot)
+    arm, chain = load_arm(robot), chain_of(robot)
     data = arm.model.createData()
     for q in postures(robot):
         factors = chain.factors(q)
@@ -57,7 +57,7 @@ def test_every_matrix_is_a_pose(robot: str) -> None:
 def test_a_factor_depends_on_one_joint_and_the_product_on_all(robot: str) -> None:
     """The last row by Pinocchio's Jacobian: a rotation changes by sqrt(2) per radian, the
     position by the joint's column."""
-    arm, chain = load(robot), chain_of(robot)
+    arm, chain = load_arm(robot), chain_of(robot)
     data = arm.model.createData()
     for q in postures(robot):
         found = chain.derivative_norms(q)

@@ -10,7 +10,7 @@ from labs.algorithms.hjb import StateGrid, ValueFunction
 from labs.errors import LabError
 from labs.optimal_control.families.systems import BLOCK_ON_A_LINE, PENDULUM
 from labs.resumable import run_to_completion
-from tests.labs.algorithms.test_indirect import COST, collocated, problem, riccati
+from tests.labs.algorithms.test_indirect import COST, problem, riccati, solve_by_collocation
 
 WINDOW = ((-1.5, -4.0), (1.5, 4.0))
 SWING = ((-1.5, -11.0), (5.0, 11.0))
@@ -67,7 +67,7 @@ def test_a_kink_does_not_oscillate() -> None:
 
 
 def test_a_limit_on_u_costs_what_pontryagin_says() -> None:
-    best = collocated(problem(BLOCK_ON_A_LINE, (1.0, 0.0), 2.0, 1.0))
+    best = solve_by_collocation(problem(BLOCK_ON_A_LINE, (1.0, 0.0), 2.0, 1.0))
     assert np.abs(best.U).max() == 1.0
     V = mass(121, 60, 1.0)
     assert V.value(np.array([1.0, 0.0]), 0.0) == pytest.approx(best.cost, rel=1e-3)
@@ -76,7 +76,7 @@ def test_a_limit_on_u_costs_what_pontryagin_says() -> None:
 
 def test_the_gradient_along_the_optimal_motion_is_its_costate() -> None:
     """To the grid's error, which falls with it."""
-    best = collocated(problem(PENDULUM, (np.pi, 0.0), 1.0, 4.0))
+    best = solve_by_collocation(problem(PENDULUM, (np.pi, 0.0), 1.0, 4.0))
     places = np.searchsorted(best.t, np.linspace(0.05, 0.95, 19))
     gaps, costs = [], []
     for nodes, steps in ((61, 20), (121, 40), (161, 60)):
@@ -107,7 +107,7 @@ def test_it_pauses_and_pausing_changes_nothing() -> None:
             pauses += 1
     except StopIteration as end:
         V = end.value.V
-    assert pauses >= 3 * 101 * 101 // hjb.BETWEEN_PAUSES
+    assert pauses >= 3 * 101 * 101 // hjb.NODES_BETWEEN_PAUSES
     np.testing.assert_array_equal(V, pendulum(101, 3).V)
 
 

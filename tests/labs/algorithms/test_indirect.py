@@ -30,14 +30,16 @@ def problem(
     return ContinuousProblem(body, cost, np.array(x0), T, -ENDLESS, ENDLESS, -bound, bound)
 
 
-def collocated(of: ContinuousProblem, swing: float = 0.5, tolerance: float = 1e-8) -> Extremal:
+def solve_by_collocation(
+    of: ContinuousProblem, swing: float = 0.5, tolerance: float = 1e-8
+) -> Extremal:
     guess = first_guess(of, swing)
     some = slice(None, None, 3)
     t, X, P = guess.t[some], guess.X[some], guess.P[some]
     return run_to_completion(indirect.solve(of, t, X, P, tolerance, 5000))
 
 
-def shot(of: ContinuousProblem, swing: float = 0.5) -> Extremal:
+def solve_by_shooting(of: ContinuousProblem, swing: float = 0.5) -> Extremal:
     return run_to_completion(indirect_shooting.shoot(of, first_guess(of, swing).P[0], steps=400))
 
 
@@ -59,7 +61,7 @@ def test_the_minimiser_is_the_least_of_all_controls() -> None:
     tried = np.linspace(-2.0, 2.0, 4001)
     H = np.stack([indirect.hamiltonian(of, X, np.full((30, 1), u), P) for u in tried])
     best = tried[H.argmin(axis=0)]
-    u = indirect.minimiser(of, X, P)[:, 0]
+    u = indirect.hamiltonian_minimiser(of, X, P)[:, 0]
     np.testing.assert_allclose(u, best, atol=1e-3)
     assert (np.abs(u) == 2.0).any()
     assert (np.abs(u) < 2.0).any()
@@ -68,19 +70,19 @@ def test_the_minimiser_is_the_least_of_all_controls() -> None:
 def test_a_free_control_has_no_minimiser() -> None:
     of = problem(PENDULUM, (1.0, 0.0), 1.0, 2.0, replace(COST, w_u=0.0))
     with pytest.raises(LabError, match="weight above zero"):
-        indirect.minimiser(of, np.zeros((1, 2)), np.zeros((1, 2)))
+        indirect.hamiltonian_minimiser(of, np.zeros((1, 2)), np.zeros((1, 2)))
 
 
 def test_a_free_time_is_refused() -> None:
     of = replace(problem(PENDULUM, (1.0, 0.0), 1.0), T_limits=(0.5, 2.0))
     with pytest.raises(LabError, match="fixed T"):
-        collocated(of)
+        solve_by_collocation(of)
 
 
 # Known solutions ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("way", [collocated, shot])
+@pytest.mark.parametrize("way", [solve_by_collocation, solve_by_shooting])
 def test_a_linear_quadratic_problem_is_riccatis(way) -> None:  # type: ignore[no-untyped-def]
     x = np.array([1.0, -0.5])
     found = way(problem(BLOCK_ON_A_LINE, (1.0, -0.5), 2.0))
@@ -89,11 +91,13 @@ def test_a_linear_quadratic_problem_is_riccatis(way) -> None:  # type: ignore[no
     assert found.cost == pytest.approx(x @ P @ x, abs=1e-9)
     np.testing.assert_allclose(found.P[0], 2.0 * P @ x, atol=1e-8)
     for t in (0.5, 1.0, 1.7):
-        there = indirect.at_times(found, problem(BLOCK_ON_A_LINE, (1.0, -0.5), 2.0), np.array([t]))
+        there = indirect.resample_extremal(
+            found, problem(BLOCK_ON_A_LINE, (1.0, -0.5), 2.0), np.array([t])
+        )
         np.testing.assert_allclose(there.P[0], 2.0 * riccati(2.0 - t) @ there.X[0], atol=1e-8)
 
 
-@pytest.mark.parametrize("way", [collocated, shot])
+@pytest.mark.parametrize("way", [solve_by_collocation, solve_by_shooting])
 def test_least_energy_to_a_given_end(way) -> None:  # type: ignore[no-untyped-def]
     """From (1, 0) to rest at 0 in 1 s: u = 12 t - 6, at a cost of 12."""
     free = SwingCost(0.0, 0.0, 1.0, 0.0, 0.0)
@@ -107,7 +111,7 @@ def test_least_energy_to_a_given_end(way) -> None:  # type: ignore[no-untyped-de
 
 def test_both_ways_meet_at_the_pendulum() -> None:
     of = problem(PENDULUM, (np.pi, 0.0), 0.6, 4.0)
-    one, other = collocated(of, tolerance=1e-6), shot(of)
+    one, other = solve_by_collocation(of, tolerance=1e-6), solve_by_shooting(of)
     assert one.converged
     assert other.converged
     assert one.cost == pytest.approx(other.cost, rel=1e-6)
@@ -120,11 +124,11 @@ def test_the_costate_is_the_gradient_of_the_optimal_cost() -> None:
     """By finite differences of the cost over the start."""
 
     def cost(q: float, v: float) -> float:
-        found = collocated(problem(PENDULUM, (q, v), 0.8))
+        found = solve_by_collocation(problem(PENDULUM, (q, v), 0.8))
         assert found.converged
         return found.cost
 
-    p = collocated(problem(PENDULUM, (2.5, -0.5), 0.8)).P[0]
+    p = solve_by_collocation(problem(PENDULUM, (2.5, -0.5), 0.8)).P[0]
     e = 1e-4
     by_q = (cost(2.5 + e, -0.5) - cost(2.5 - e, -0.5)) / (2.0 * e)
     by_v = (cost(2.5, -0.5 + e) - cost(2.5, -0.5 - e)) / (2.0 * e)
@@ -136,11 +140,11 @@ def test_the_costate_is_the_gradient_of_the_optimal_cost() -> None:
 
 def test_a_limit_on_the_state_that_is_broken_is_not_converged() -> None:
     of = problem(BLOCK_ON_A_LINE, (1.0, 0.0), 2.0)
-    found = collocated(replace(of, x_lower=np.array([-np.inf, -0.5])))
+    found = solve_by_collocation(replace(of, x_lower=np.array([-np.inf, -0.5])))
     assert not found.converged
     assert found.stopped.startswith("Infeasible: ")
     assert "the limit on x_2 is exceeded" in found.stopped
-    assert collocated(replace(of, x_lower=np.array([-np.inf, -5.0]))).converged
+    assert solve_by_collocation(replace(of, x_lower=np.array([-np.inf, -5.0]))).converged
 
 
 def test_a_path_constraint_that_is_broken_is_named() -> None:
@@ -157,13 +161,13 @@ def test_a_path_constraint_that_is_broken_is_named() -> None:
         def name(self, i: int) -> str:
             return "the distance from the post"
 
-    found = collocated(replace(problem(BLOCK_ON_A_LINE, (1.0, 0.0), 2.0), path=Post()))
+    found = solve_by_collocation(replace(problem(BLOCK_ON_A_LINE, (1.0, 0.0), 2.0), path=Post()))
     assert not found.converged
     assert "the distance from the post is exceeded" in found.stopped
 
 
 def test_shooting_says_what_is_in_its_way() -> None:
-    far = shot(problem(PENDULUM, (np.pi, 0.0), 1.5, 4.0))
+    far = solve_by_shooting(problem(PENDULUM, (np.pi, 0.0), 1.5, 4.0))
     assert not far.converged
     assert far.stopped.startswith("The line search ends")
     of = problem(PENDULUM, (1.0, 0.0), 3.0)

@@ -8,17 +8,17 @@ import pytest
 from scipy.optimize import linprog
 
 from labs.algorithms import admissible_set, invariant_sets
-from labs.algorithms.admissible_set import limits_under, maximal_output_admissible_set
+from labs.algorithms.admissible_set import closed_loop_limits, maximal_output_admissible_set
 from labs.algorithms.invariant_sets import (
     backward_reachable,
     control_invariance_violation,
-    excess,
     feasible_sets,
+    inclusion_violation,
     maximal_control_invariant_set,
     positive_invariance_violation,
 )
-from labs.algorithms.polygons import area, from_vertices, vertices
-from labs.algorithms.polytopes import without_redundant_rows
+from labs.algorithms.polygons import area, polyhedron_from_vertices, vertices
+from labs.algorithms.polytopes import remove_redundant_rows
 from labs.algorithms.riccati import steady_state
 from labs.errors import LabError
 from labs.problems.linear_mpc import LinearMpcProblem
@@ -36,11 +36,11 @@ EVERYWHERE = Polyhedron(np.zeros((0, 2)), np.zeros(0))
 ORIGIN, STILL = box([0.0, 0.0], [0.0, 0.0]), box([-1.0, 0.0], [1.0, 0.0])
 
 
-def regulated(name: str) -> tuple[np.ndarray, Polyhedron]:
+def closed_loop_constraints(name: str) -> tuple[np.ndarray, Polyhedron]:
     """A + B K and the limits under u = K x."""
     A, B = SYSTEMS[name]
     K = steady_state(A, B, np.diag([100.0, 1.0]), np.eye(1)).gain
-    return A + B @ K, limits_under(K, X, U)
+    return A + B @ K, closed_loop_limits(K, X, U)
 
 
 def mpc(
@@ -82,7 +82,7 @@ def feasible(problem: LinearMpcProblem, x: np.ndarray) -> bool:
     return bool(programme.status == 0)
 
 
-def clear_of_the_edge(polyhedron: Polyhedron, points: np.ndarray) -> np.ndarray:
+def off_boundary(polyhedron: Polyhedron, points: np.ndarray) -> np.ndarray:
     """Which points are in, or out, by more than the solvers' tolerances."""
     sure = polyhedron.contains(points, -1e-6) | ~polyhedron.contains(points, 1e-6)
     return np.asarray(sure)
@@ -90,30 +90,30 @@ def clear_of_the_edge(polyhedron: Polyhedron, points: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_the_admissible_set_is_what_simulation_finds(name: str) -> None:
-    A, limits = regulated(name)
+    A, limits = closed_loop_constraints(name)
     found = maximal_output_admissible_set(A, limits)
     assert found.found
     x, kept = GRID, np.ones(GRID.shape[:-1], bool)
     for _ in range(300):
         kept &= limits.contains(x)
         x = x @ A.T
-    sure = clear_of_the_edge(found.set, GRID)
+    sure = off_boundary(found.set, GRID)
     assert (found.set.contains(GRID) == kept)[sure].all()
     assert 0 < kept.sum() < kept.size
     assert sure.mean() > 0.95
     assert positive_invariance_violation(A, found.set) <= 1e-9
-    assert excess(found.set, limits) <= 1e-12
+    assert inclusion_violation(found.set, limits) <= 1e-12
 
 
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_linear_programmes_step_by_step_find_what_clipping_does(name: str) -> None:
-    A, limits = regulated(name)
+    A, limits = closed_loop_constraints(name)
     quick = maximal_output_admissible_set(A, limits)
     at = admissible_set.init(limits)
     steps, cut = 0, []
     while not at.done:
         cut.append(area(vertices(at.set)))
-        at = run_to_completion(admissible_set.step_in_pieces(A, limits, at))
+        at = run_to_completion(admissible_set.resumable_step(A, limits, at))
         steps += 1
         # J_i* > 0 is what takes a piece of the set away.
         shrinks = area(vertices(at.set)) < cut[-1] - 1e-12
@@ -121,8 +121,8 @@ def test_linear_programmes_step_by_step_find_what_clipping_does(name: str) -> No
     assert at.found
     assert at.t == quick.t == steps - 1
     assert np.abs(at.J - quick.J).max() <= 1e-7
-    assert excess(at.set, quick.set) <= 1e-9
-    assert excess(quick.set, at.set) <= 1e-9
+    assert inclusion_violation(at.set, quick.set) <= 1e-9
+    assert inclusion_violation(quick.set, at.set) <= 1e-9
 
 
 def test_what_has_no_admissible_set_says_so() -> None:
@@ -143,7 +143,7 @@ def test_an_unbounded_limit_and_three_dimensions() -> None:
     assert found.t >= 2
     x = np.random.default_rng(0).uniform(-3.0, 3.0, (2000, 3))
     inside, kept = found.set.contains(x), np.ones(2000, bool)
-    sure = clear_of_the_edge(found.set, x)
+    sure = off_boundary(found.set, x)
     for _ in range(200):
         kept &= limits.contains(x)
         x = x @ A.T
@@ -157,17 +157,17 @@ def test_the_feasible_set_is_where_a_linear_programme_finds_controls(
     name: str, terminal: Polyhedron | str | None
 ) -> None:
     if isinstance(terminal, str):
-        terminal = maximal_output_admissible_set(*regulated(name)).set
+        terminal = maximal_output_admissible_set(*closed_loop_constraints(name)).set
     problem = mpc(name, 5, terminal)
     sets = feasible_sets(problem)
     assert len(sets) == 6
     points = GRID[3::6, 3::6].reshape(-1, 2)
-    sure = clear_of_the_edge(sets[0], points)
+    sure = off_boundary(sets[0], points)
     told = [feasible(problem, x) for x in points[sure]]
     assert sets[0].contains(points[sure]).tolist() == told
     if terminal is not None and terminal is not STILL:
         for i in range(5):  # what is invariant can be reached from all that was reached later
-            assert excess(sets[i + 1], sets[i]) <= 1e-9
+            assert inclusion_violation(sets[i + 1], sets[i]) <= 1e-9
         assert control_invariance_violation(*SYSTEMS[name], U, sets[0]) <= 1e-9
 
 
@@ -177,7 +177,7 @@ def test_drift_and_tightened_limits_count() -> None:
     problem = mpc("unstable", 4, box([-0.2, -0.2], [0.3, 0.3]), np.array([0.02, -0.03]), margins)
     first = feasible_sets(problem)[0]
     points = GRID[::6, ::6].reshape(-1, 2)
-    sure = clear_of_the_edge(first, points)
+    sure = off_boundary(first, points)
     told = [feasible(problem, x) for x in points[sure]]
     assert first.contains(points[sure]).tolist() == told
     assert 0 < sum(told) < len(told)
@@ -196,10 +196,13 @@ def test_sums_in_the_plane_and_shadows_of_a_polyhedron_agree() -> None:
         shadow = polytope.projection(polytope.Polytope(both.H, both.h), [1, 2])
         expected = Polyhedron(np.asarray(shadow.A), np.asarray(shadow.b))
         summed = backward_reachable(A, B, X, U, target)
-        assert max(excess(expected, summed), excess(summed, expected)) <= 1e-7
+        assert (
+            max(inclusion_violation(expected, summed), inclusion_violation(summed, expected))
+            <= 1e-7
+        )
         free = backward_reachable(A, B, X, Polyhedron(np.zeros((0, 1)), np.zeros(0)), target)
         nearly = backward_reachable(A, B, X, far, target)
-        assert max(excess(free, nearly), excess(nearly, free)) <= 1e-7
+        assert max(inclusion_violation(free, nearly), inclusion_violation(nearly, free)) <= 1e-7
 
 
 def test_input_limits_alone_leave_the_whole_plane() -> None:
@@ -215,10 +218,10 @@ def test_the_maximal_control_invariant_set_holds_all_others(name: str) -> None:
     largest = maximal_control_invariant_set(A, B, X, U)
     assert largest.found
     assert control_invariance_violation(A, B, U, largest.set) <= 2e-9
-    admissible = maximal_output_admissible_set(*regulated(name)).set
+    admissible = maximal_output_admissible_set(*closed_loop_constraints(name)).set
     sets = feasible_sets(mpc(name, 40, admissible))
     for each in sets[::10]:
-        assert excess(each, largest.set) <= 1e-7
+        assert inclusion_violation(each, largest.set) <= 1e-7
     assert area(vertices(sets[0])) == pytest.approx(area(vertices(largest.set)), rel=0.01)
     assert control_invariance_violation(A, B, U, X) > 0.1
 
@@ -232,7 +235,7 @@ def test_nothing_is_left_where_no_control_keeps_it_in() -> None:
 def test_the_examples_of_borrelli_bemporad_and_morari() -> None:
     around = box([-10.0, -10.0], [10.0, 10.0])
     found = maximal_output_admissible_set(np.array([[0.5, 0.0], [1.0, -0.5]]), around)
-    rows = without_redundant_rows(found.set)
+    rows = remove_redundant_rows(found.set)
     printed = [[1, 0, 10], [0, 1, 10], [-1, 0, 10], [0, -1, 10], [1, -0.5, 10], [-1, 0.5, 10]]
     scaled = np.c_[rows.H, rows.h] / np.abs(rows.H).max(axis=1, keepdims=True)
     assert sorted(scaled.round(9).tolist()) == sorted(np.asarray(printed, float).tolist())
@@ -242,6 +245,9 @@ def test_the_examples_of_borrelli_bemporad_and_morari() -> None:
     largest = maximal_control_invariant_set(A, B, around, box([-5.0], [5.0]))
     H = np.array([[0.0, 1.0], [0.0, -1.0], [0.5547, -0.83205], [-0.5547, 0.83205]])
     expected = Polyhedron(H, np.array([4.0, 4.0, 2.2188, 2.2188]))  # printed: 4, 4, 2.22, 2.22
-    assert max(excess(largest.set, expected), excess(expected, largest.set)) <= 1e-3
+    assert (
+        max(inclusion_violation(largest.set, expected), inclusion_violation(expected, largest.set))
+        <= 1e-3
+    )
     assert invariant_sets.init(around).set is around
-    assert from_vertices(vertices(largest.set)).contains(np.array([9.9, 3.95]))
+    assert polyhedron_from_vertices(vertices(largest.set)).contains(np.array([9.9, 3.95]))

@@ -7,7 +7,7 @@ from scipy.optimize import lsq_linear
 
 from labs.algorithms.inverse_kinematics import (
     INVERSE_KINEMATICS_METHODS,
-    REACHED,
+    REACH_TOLERANCE,
     clip_norm,
     damped_least_squares,
     jacobian_transpose,
@@ -19,7 +19,7 @@ from labs.algorithms.inverse_kinematics import (
     scale_to_speed_limit,
 )
 from labs.algorithms.jacobian import ForwardKinematics, geometric_jacobian
-from labs.models.arms import load
+from labs.models.arms import load_arm
 
 RNG = np.random.default_rng(11)
 
@@ -87,7 +87,7 @@ def test_the_pseudo_inverse_has_no_bound_and_the_transpose_fades() -> None:
 
 
 def test_the_transpose_goes_down_the_gradient_of_the_squared_error() -> None:
-    arm = load("ur5")
+    arm = load_arm("ur5")
     kinematics, target, d = ForwardKinematics(arm.model, arm.tip), np.array([0.4, 0.3, 0.5]), 1e-6
 
     def half_square(q: np.ndarray) -> float:
@@ -105,7 +105,7 @@ def test_the_transpose_goes_down_the_gradient_of_the_squared_error() -> None:
 @pytest.mark.parametrize("method", INVERSE_KINEMATICS_METHODS)
 def test_it_converges_to_a_pose_within_reach(method: str, robot: str) -> None:
     """From home to where known joint angles lead, all six rows."""
-    arm = load(robot)
+    arm = load_arm(robot)
     kinematics = ForwardKinematics(arm.model, arm.tip)
     goal = kinematics.at(arm.home + 0.1 * np.linspace(-1, 1, arm.model.nv)).placement
     q = arm.home.copy()
@@ -155,7 +155,7 @@ def test_manipulability_is_the_root_of_a_determinant(m: int, n: int, sigma: list
 
 def test_the_nearest_distance_of_a_planar_arm_in_closed_form() -> None:
     """Links of 0.4 and 0.3 m on a slide of 0.3 m: a ring, extended up and down."""
-    arm = load("scara")
+    arm = load_arm("scara")
     kinematics, model = ForwardKinematics(arm.model, arm.tip), arm.model
     limits = model.lowerPositionLimit, model.upperPositionLimit
     height = kinematics.at(arm.home).placement.translation[2]
@@ -168,16 +168,16 @@ def test_the_nearest_distance_of_a_planar_arm_in_closed_form() -> None:
         ([1.0, 0.0, top + 0.4], 0.5),
     ):
         found = nearest_distance(kinematics, np.array(target), starts, *limits)
-        assert found == pytest.approx(wanted, abs=REACHED)
+        assert found == pytest.approx(wanted, abs=REACH_TOLERANCE)
 
 
 @pytest.mark.parametrize("robot", ["ur5", "panda", "scara"])
 def test_no_place_a_posture_reaches_is_out_of_reach(robot: str) -> None:
-    arm, rng = load(robot), np.random.default_rng(5)
+    arm, rng = load_arm(robot), np.random.default_rng(5)
     kinematics, model = ForwardKinematics(arm.model, arm.tip), arm.model
     limits = model.lowerPositionLimit, model.upperPositionLimit
     within = np.maximum(limits[0], -np.pi), np.minimum(limits[1], np.pi)
     for q in rng.uniform(*within, (30, model.nq)):
         place = kinematics.at(q).placement.translation
         starts = [arm.home, *rng.uniform(*within, (5, model.nq))]
-        assert nearest_distance(kinematics, place, starts, *limits) <= REACHED
+        assert nearest_distance(kinematics, place, starts, *limits) <= REACH_TOLERANCE

@@ -18,7 +18,7 @@ from labs.algorithms.jacobian import (
     inverse_rpy_rate_matrix,
 )
 from labs.algorithms.orientation import euler_axes, matrix_to_rpy, rpy_to_matrix
-from labs.models.arms import Arm, load
+from labs.models.arms import Arm, load_arm
 
 ARMS = ("ur5", "panda", "scara", "double-pendulum")
 WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
@@ -27,7 +27,7 @@ D = 1e-6
 
 @pytest.fixture(params=ARMS)
 def arm(request: pytest.FixtureRequest) -> Arm:
-    return load(request.param)
+    return load_arm(request.param)
 
 
 def postures(arm: Arm, count: int = 5) -> list[np.ndarray]:
@@ -103,7 +103,7 @@ def test_the_rate_of_the_jacobian_is_pinocchios_and_the_limit_of_differences(arm
 
 
 def test_a_joint_beyond_the_frame_does_not_move_it() -> None:
-    arm = load("ur5")
+    arm = load_arm("ur5")
     chain = ForwardKinematics(arm.model, arm.model.getFrameId("elbow_joint")).at(arm.home)
     assert chain.supports.tolist() == [True, True, True, False, False, False]
     v = velocities(arm)
@@ -134,7 +134,7 @@ def test_the_two_link_arm_in_closed_form() -> None:
 
 
 def test_the_scara_is_a_two_link_arm_on_a_slide() -> None:
-    arm = load("scara")
+    arm = load_arm("scara")
     q = np.array([0.3, 1.1, 0.07, -0.4])
     chain = ForwardKinematics(arm.model, arm.tip).at(q)
     c1, c12, s1, s12 = np.cos(0.3), np.cos(1.4), np.sin(0.3), np.sin(1.4)
@@ -185,7 +185,7 @@ def test_at_the_lock_the_analytical_jacobian_belongs_to_the_angles_of_the_rotati
     rotation = rpy_to_matrix(np.array([0.1, pitch, 0.2]))
     angles = matrix_to_rpy(rotation)
     np.testing.assert_allclose(rpy_to_matrix(angles), rotation, atol=1e-15)
-    arm = load("ur5")
+    arm = load_arm("ur5")
     chain = ForwardKinematics(arm.model, arm.tip).at(arm.home)
     chain = replace(chain, placement=pin.SE3(rotation, chain.placement.translation))
     jacobian = geometric_jacobian(chain)

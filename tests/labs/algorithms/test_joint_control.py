@@ -6,14 +6,14 @@ import pytest
 
 from labs.algorithms.equation_of_motion import mass_matrix
 from labs.algorithms.joint_control import CONTROL_LAWS, ControlLaw, Gains, linearise_law
-from labs.models.arms import load
+from labs.models.arms import load_arm
 
 GAINS = Gains(kp=120.0, ki=33.0, kd=9.0)
 
 
 @pytest.fixture(params=["ur5", "panda", "double-pendulum"])
 def model(request: pytest.FixtureRequest) -> pin.Model:
-    return load(request.param).model
+    return load_arm(request.param).model
 
 
 def arguments(model: pin.Model) -> list[np.ndarray]:

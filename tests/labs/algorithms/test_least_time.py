@@ -11,7 +11,7 @@ from labs.algorithms.single_shooting import SingleShooting
 from labs.problems.continuous_control import ContinuousProblem
 from labs.tasks.motion.continuous import MotionLimits, continuous_motion
 from tests.labs.algorithms.collocation_oracle import ipopt
-from tests.labs.algorithms.transcriptions import straight
+from tests.labs.algorithms.transcriptions import straight_guess
 
 N = 12
 
@@ -26,8 +26,8 @@ def swing_up(name: str, limit: float, T: float) -> ContinuousProblem:
 @pytest.mark.parametrize("T", [2.0, 4.0])
 def test_it_is_found_from_plain_guesses(T: float, guess: str) -> None:
     problem = swing_up("pendulum", 0.6, T)
-    X, U = plain(problem, guess)
-    by_states = collocated(problem, X, U)
+    X, U = initial_guess(problem, guess)
+    by_states = collocation_time(problem, X, U)
     multiple = MultipleShooting(problem, N, 5, 2)
     by_segments = sqp.solve(multiple, multiple.variables(X, U, T))
     assert by_segments.converged, by_segments.stopped
@@ -43,17 +43,17 @@ def test_so_is_that_of_the_cart_pole(limit: float) -> None:
     times = []
     for T, guess in ((1.5, "still"), (3.0, "line")):
         problem = swing_up("cart-pole", limit, T)
-        times.append(collocated(problem, *plain(problem, guess)))
+        times.append(collocation_time(problem, *initial_guess(problem, guess)))
     assert times[0] == pytest.approx(times[1], rel=1e-6)
 
 
-def plain(problem: ContinuousProblem, guess: str) -> tuple[np.ndarray, np.ndarray]:
+def initial_guess(problem: ContinuousProblem, guess: str) -> tuple[np.ndarray, np.ndarray]:
     """X (N + 1, nx) on a line to the goal, or still; without a control."""
-    X = straight(problem, N).X if guess == "line" else np.tile(problem.x0, (N + 1, 1))
+    X = straight_guess(problem, N).X if guess == "line" else np.tile(problem.x0, (N + 1, 1))
     return X, np.zeros((N, 1))
 
 
-def collocated(problem: ContinuousProblem, X: np.ndarray, U: np.ndarray) -> float:
+def collocation_time(problem: ContinuousProblem, X: np.ndarray, U: np.ndarray) -> float:
     """The least time [s] by collocation from there, which is Ipopt's."""
     program = Collocation(problem, N)
     at = sqp.solve(program, program.variables(X, U))

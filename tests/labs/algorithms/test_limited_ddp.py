@@ -9,7 +9,7 @@ from labs.algorithms import ddp
 from labs.algorithms.ddp import DdpIterate, DdpOptions
 from labs.problems.optimal_control import OptimalControlProblem
 from labs.tasks.motion.cost import MotionCost
-from labs.tasks.motion.motions import MOTIONS, MotionWeights, first_guess, motion_problem
+from labs.tasks.motion.motions import MOTIONS, MotionWeights, initial_controls, motion_problem
 from tests.labs.algorithms.ipopt_oracle import optimum
 
 NOTICEABLE = 1e-4
@@ -38,7 +38,7 @@ def limited_problem(seed: int) -> tuple[OptimalControlProblem, np.ndarray, DdpOp
         target=None if MOTIONS[name].goal else np.array([0.4, -0.35, 0.25]),
         limit=rng.uniform(0.2, 1.5),
     )
-    guess = first_guess(
+    guess = initial_controls(
         problem, np.array(MOTIONS[name].control_scale), rng.uniform(-1, 1), rng.uniform(0, 2)
     )
     options = DdpOptions(second_order=bool(rng.integers(2)), tolerance=1e-8, iterations=300)
@@ -79,7 +79,7 @@ def swing_up() -> tuple[OptimalControlProblem, np.ndarray]:
     """Of the double pendulum, within narrow bounds."""
     weights = MotionWeights(goal=10.0, rest=1.0, posture=3.0, velocity=0.01, control=0.01)
     problem = motion_problem("double-pendulum", weights, 25, 0.04, limit=0.7)
-    return problem, first_guess(
+    return problem, initial_controls(
         problem, np.array(MOTIONS["double-pendulum"].control_scale), 0.1, 1.0
     )
 

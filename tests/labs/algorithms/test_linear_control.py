@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from labs.algorithms import td_control
-from labs.algorithms.approximation import best_fit, mean_update, td_fixed_point
+from labs.algorithms.approximation import expected_td_update, td_fixed_point, weighted_least_squares
 from labs.algorithms.batch_approximation import (
     REPLAY_MC,
     REPLAY_TD,
@@ -18,8 +18,14 @@ from labs.algorithms.batch_approximation import (
     replay,
     replay_q_learning,
 )
-from labs.algorithms.exploration import FOLLOW, BehaviourPolicy
-from labs.algorithms.features import Features, aggregation, from_matrix, table, vanishing
+from labs.algorithms.exploration import FIXED_POLICY, BehaviourPolicy
+from labs.algorithms.features import (
+    Features,
+    features_from_matrix,
+    state_aggregation,
+    tabular_features,
+    zero_features_at,
+)
 from labs.algorithms.linear_control import (
     MC_CONTROL,
     Q_LEARNING,
@@ -31,11 +37,16 @@ from labs.algorithms.linear_control import (
 from labs.errors import LabError
 from labs.problems.episodes import UpdateRule, episodic_task
 from labs.problems.finite_mdp import FiniteMDP, random_policy
-from labs.random_numbers import seeded
+from labs.random_numbers import random_states
 from labs.reinforcement_learning.function_approximation.counterexamples import baird
 from labs.resumable import run_to_completion
-from labs.tasks.random_walk.walks import NINETEEN, visit_share, walk_mdp, walk_task
-from tests.labs.algorithms.learning_tasks import fresh, grid, optimum, random_mdp
+from labs.tasks.random_walk.walks import (
+    NINETEEN_STATE_WALK,
+    on_policy_distribution,
+    walk_mdp,
+    walk_task,
+)
+from tests.labs.algorithms.learning_tasks import grid, initial_learners, optimum, random_mdp
 
 
 @pytest.mark.parametrize(
@@ -44,9 +55,9 @@ from tests.labs.algorithms.learning_tasks import fresh, grid, optimum, random_md
 def test_with_one_feature_a_state_it_is_the_table(linear: int, tabular: int) -> None:
     """Bit for bit, as alpha is a power of two."""
     _, task = grid("cliff", slip=0.1)
-    features = vanishing(table(len(task.cost)), task.terminal)
+    features = zero_features_at(tabular_features(len(task.cost)), task.terminal)
     behaviour, rule = BehaviourPolicy(epsilon=0.3, decay=0.5), UpdateRule(0.5)
-    by_table = td_control.step(task, behaviour, rule, tabular, fresh(task, 3), 100)
+    by_table = td_control.step(task, behaviour, rule, tabular, initial_learners(task, 3), 100)
     start = init(task, features, 3, np.random.default_rng(0))
     by_weights = step(task, features, behaviour, rule, linear, start, 100)
     for s in range(3):
@@ -62,7 +73,7 @@ def test_monte_carlo_control_by_table_finds_the_optimum() -> None:
     """Greedy in the limit, falling steps: the 4x4 world from anywhere, exactly in its choices."""
     mdp = grid("4x4")[0].mdp(1.0)
     task = episodic_task(mdp, list(np.flatnonzero(~mdp.terminal)), 1000)
-    features = vanishing(table(mdp.X), mdp.terminal)
+    features = zero_features_at(tabular_features(mdp.X), mdp.terminal)
     start = init(task, features, 4, np.random.default_rng(0))
     behaviour = BehaviourPolicy(epsilon=1.0, decay=0.5)
     after = step(task, features, behaviour, UpdateRule(1.0, 0.7), MC_CONTROL, start, 20_000)
@@ -78,7 +89,7 @@ def test_q_learning_diverges_on_baird_s_star_while_sarsa_does_not() -> None:
     ever more so, and is seldom applied."""
     star = baird()
     task = episodic_task(star.mdp, range(7), 1000)
-    uneven = BehaviourPolicy(FOLLOW, epsilon=2.0 / 7.0, policy=np.zeros(7, np.int64))
+    uneven = BehaviourPolicy(FIXED_POLICY, epsilon=2.0 / 7.0, policy=np.zeros(7, np.int64))
     start = init(task, star.features, 5, np.random.default_rng(0))
     w = start.w.copy()
     w[:, 1] = -star.w
@@ -86,22 +97,24 @@ def test_q_learning_diverges_on_baird_s_star_while_sarsa_does_not() -> None:
     rule = UpdateRule(0.01, limit=1e9)
     off = step(task, star.features, uneven, rule, Q_LEARNING, start, 200)
     on = step(task, star.features, uneven, rule, SARSA, start, 200)
-    assert on.sound.all()
+    assert on.bounded.all()
     assert np.abs(on.w).max() <= np.abs(w).max()
-    assert not off.sound.any()
+    assert not off.bounded.any()
     assert np.isfinite(off.w).all()
     again = step(task, star.features, uneven, rule, Q_LEARNING, off, 1)
     assert np.array_equal(again.w, off.w)
 
 
 def batch_of_walks(episodes: int = 200) -> TransitionBatch:
-    random = seeded(np.random.default_rng(0), 1)[0]
-    return collect_transitions(walk_task(NINETEEN), random, episodes)
+    random = random_states(np.random.default_rng(0), 1)[0]
+    return collect_transitions(walk_task(NINETEEN_STATE_WALK), random, episodes)
 
 
 def walk_groups() -> Features:
     """Five of four states, but for the ends."""
-    return vanishing(aggregation(np.arange(21) * 5 // 21), walk_task(NINETEEN).task.terminal)
+    return zero_features_at(
+        state_aggregation(np.arange(21) * 5 // 21), walk_task(NINETEEN_STATE_WALK).task.terminal
+    )
 
 
 def test_a_batch_has_two_answers_and_replay_comes_to_both() -> None:
@@ -123,17 +136,17 @@ def test_a_batch_has_two_answers_and_replay_comes_to_both() -> None:
         return run_to_completion(work)
 
     for method, answer in ((REPLAY_MC, fit), (REPLAY_TD, fixed)):
-        random = seeded(np.random.default_rng(1), 1)[0]
+        random = random_states(np.random.default_rng(1), 1)[0]
         w = run_to_completion(
             replay(features, batch, 1.0, rule, method, np.zeros(5), random, 6_000_000)
         )
         np.testing.assert_allclose(phi @ w, phi @ answer, atol=0.05)
-        again = seeded(np.random.default_rng(1), 1)[0]
+        again = random_states(np.random.default_rng(1), 1)[0]
         half = replayed(method, np.zeros(5), again, 70)
         half = run_to_completion(
             replay(features, batch, 1.0, rule, method, half, again, 30, drawn=70)
         )
-        once = seeded(np.random.default_rng(1), 1)[0]
+        once = random_states(np.random.default_rng(1), 1)[0]
         whole = run_to_completion(
             replay(features, batch, 1.0, rule, method, np.zeros(5), once, 100)
         )
@@ -141,12 +154,20 @@ def test_a_batch_has_two_answers_and_replay_comes_to_both() -> None:
 
 
 def test_large_batches_lead_to_the_fixed_points_of_the_chain() -> None:
-    task, features, mdp = walk_task(NINETEEN), walk_groups(), walk_mdp(NINETEEN)
-    batch, mu, phi = batch_of_walks(20_000), visit_share(NINETEEN), features.dense
+    task, features, mdp = (
+        walk_task(NINETEEN_STATE_WALK),
+        walk_groups(),
+        walk_mdp(NINETEEN_STATE_WALK),
+    )
+    batch, mu, phi = (
+        batch_of_walks(20_000),
+        on_policy_distribution(NINETEEN_STATE_WALK),
+        features.dense,
+    )
     P, C = mdp.transition_matrix(random_policy(mdp)), mdp.policy_cost(random_policy(mdp))
-    fixed = td_fixed_point(*mean_update(P, C, 1.0, phi, mu))
+    fixed = td_fixed_point(*expected_td_update(P, C, 1.0, phi, mu))
     np.testing.assert_allclose(phi @ lstd(features, batch, 1.0), phi @ fixed, atol=0.02)
-    best = best_fit(task.truth, phi, mu)
+    best = weighted_least_squares(task.truth, phi, mu)
     np.testing.assert_allclose(phi @ least_squares_fit(features, batch), phi @ best, atol=0.02)
 
 
@@ -161,7 +182,7 @@ def exploring_batch(mdp: FiniteMDP, draws: int) -> TransitionBatch:
 def test_a_fixed_batch_teaches_the_optimum_by_a_table() -> None:
     """Fitted Q-iteration and replayed Q-learning: both to the optimum of the batch's own model."""
     mdp = random_mdp(5, 2, 0.7, seed=4)
-    batch, features = exploring_batch(mdp, 4000), table(5)
+    batch, features = exploring_batch(mdp, 4000), tabular_features(5)
     counts = np.zeros((2, 5, 5))
     np.add.at(counts, (batch.u, batch.x, batch.y), 1.0)
     seen = FiniteMDP(mdp.C, 0.7, mdp.terminal, P=counts / counts.sum(axis=2, keepdims=True))
@@ -169,7 +190,7 @@ def test_a_fixed_batch_teaches_the_optimum_by_a_table() -> None:
     for _ in range(80):
         w = run_to_completion(fitted_q_iteration(features, batch, 0.7, w))
     np.testing.assert_allclose(q_table(features, w), optimum(seen), atol=1e-9)
-    random = seeded(np.random.default_rng(5), 1)[0]
+    random = random_states(np.random.default_rng(5), 1)[0]
     rule = UpdateRule(1.0, 0.6)
     learned = run_to_completion(
         replay_q_learning(features, batch, 0.7, rule, np.zeros((2, 5)), random, 1_000_000)
@@ -180,21 +201,24 @@ def test_a_fixed_batch_teaches_the_optimum_by_a_table() -> None:
 
 def test_what_does_not_fit_is_refused() -> None:
     _, task = grid("cliff")
-    good = vanishing(table(len(task.cost)), task.terminal)
+    good = zero_features_at(tabular_features(len(task.cost)), task.terminal)
     start = init(task, good, 1, np.random.default_rng(0))
-    for features, words in ((table(3), "3 states"), (table(len(task.cost)), "all features are 0")):
+    for features, words in (
+        (tabular_features(3), "3 states"),
+        (tabular_features(len(task.cost)), "all features are 0"),
+    ):
         with pytest.raises(LabError, match=words):
             init(task, features, 1, np.random.default_rng(0))
     greedy, rule = BehaviourPolicy(), UpdateRule()
-    few = aggregation(np.zeros(len(task.cost)))
+    few = state_aggregation(np.zeros(len(task.cost)))
     with pytest.raises(LabError, match="weights"):
         step(task, few, greedy, rule, SARSA, start, 1)
     with pytest.raises(LabError, match="policy of 0"):
-        step(task, good, BehaviourPolicy(FOLLOW), rule, SARSA, start, 1)
+        step(task, good, BehaviourPolicy(FIXED_POLICY), rule, SARSA, start, 1)
     with pytest.raises(LabError, match="no method 3"):
         step(task, good, greedy, rule, 3, start, 1)
     empty = TransitionBatch(*(np.zeros(0, int) for _ in range(5)))
-    random = seeded(np.random.default_rng(0), 1)[0]
+    random = random_states(np.random.default_rng(0), 1)[0]
     with pytest.raises(LabError, match="empty batch"):
         run_to_completion(replay(good, empty, 1.0, rule, REPLAY_TD, np.zeros(good.size), random, 1))
 
@@ -202,9 +226,12 @@ def test_what_does_not_fit_is_refused() -> None:
 @pytest.mark.parametrize("gamma", [1.0, 0.9])
 def test_lstd_of_groups_of_states_is_that_of_any_features(gamma: float) -> None:
     """Solved by its band; the same features, written as a matrix, by rank."""
-    batch, apart = batch_of_walks(5), vanishing(table(21), walk_task(NINETEEN).task.terminal)
+    batch, apart = (
+        batch_of_walks(5),
+        zero_features_at(tabular_features(21), walk_task(NINETEEN_STATE_WALK).task.terminal),
+    )
     for few in (batch, TransitionBatch(*(column[:7] for column in batch))):  # the second is cut
         for features in (apart, walk_groups()):
-            dense = from_matrix(features.dense)
+            dense = features_from_matrix(features.dense)
             for answers in (least_squares_fit, partial(lstd, gamma=gamma)):
                 np.testing.assert_allclose(answers(features, few), answers(dense, few), atol=1e-9)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from labs.algorithms.linear_mpc import LinearPlan, LinearPlanner
-from labs.algorithms.linear_mpc_limits import TwoSided
+from labs.algorithms.linear_mpc_limits import TwoSidedLimits
 from labs.algorithms.terminal_cost import cost_of_gain
 from labs.errors import LabError
 from labs.problems.linear_mpc import LinearMpcProblem
@@ -159,7 +159,7 @@ def test_soft_limits_are_exact_above_the_multipliers(form: Literal["condensed", 
     assert above.violation == 0.0
     # The softened programme itself has the hard solution, too.
     soft = LinearPlanner(DOUBLE_INTEGRATOR, form, penalty=1.01 * largest)
-    np.testing.assert_allclose(soft._sparsely(np.array(x), 10, hard=False).U, hard.U, atol=1e-5)
+    np.testing.assert_allclose(soft._plan_sparse(np.array(x), 10, hard=False).U, hard.U, atol=1e-5)
     below = plan(LinearPlanner(DOUBLE_INTEGRATOR, form, penalty=0.5 * largest), x)
     assert below.found
     assert below.violation > 0.01
@@ -291,20 +291,20 @@ def test_other_terms_make_another_problem(form: Literal["condensed", "sparse"]) 
         "r": np.array([0.1]),
         "control_margins": np.full((10, 2), 0.5),
     }
-    other = plan(planner.following(**terms), x)
+    other = plan(planner.with_terms(**terms), x)
     fresh = plan(LinearPlanner(replace(DOUBLE_INTEGRATOR, **terms), form), x)
     np.testing.assert_array_equal(other.U, fresh.U)
     assert np.abs(other.U).max() == pytest.approx(0.5)
     np.testing.assert_array_equal(plan(planner, x).U, before.U)
     with pytest.raises(LabError, match="Q may not change"):
-        planner.following(Q=np.eye(2))
+        planner.with_terms(Q=np.eye(2))
 
 
 def test_opposite_rows_are_joined() -> None:
     limits = box([-1.0, -2.0], [3.0, np.inf]).intersection(
         Polyhedron(np.array([[1.0, 1.0]]), np.ones(1))
     )
-    joined = TwoSided.of(limits)
+    joined = TwoSidedLimits.of(limits)
     assert len(joined.H) == 3
     lower, upper = joined.bounds(limits.h)
     inside = np.random.default_rng(0).uniform(-4, 4, (200, 2))

@@ -30,7 +30,7 @@ def weight(n: int) -> np.ndarray:
     return np.asarray(M @ M.T + 0.1 * np.eye(n))
 
 
-def let_loose(A: np.ndarray, X: np.ndarray, steps: int) -> np.ndarray:
+def simulate(A: np.ndarray, X: np.ndarray, steps: int) -> np.ndarray:
     """(steps + 1, k, n) from states X (k, n)."""
     paths = [X]
     for _ in range(steps):
@@ -80,7 +80,7 @@ def test_no_state_of_many_breaks_the_bound(n: int) -> None:
         found = linear_constants(A, solve_lyapunov(A, weight(n)))
         assert found.holds
         assert 0.0 <= found.gamma < 1.0 <= found.c
-        paths = let_loose(A, RNG.normal(size=(2000, n)), 60)
+        paths = simulate(A, RNG.normal(size=(2000, n)), 60)
         norms = np.linalg.norm(paths, axis=2)
         assert (norms <= found.bound(60)[:, None] * norms[0] * (1 + 1e-12)).all()
 
@@ -177,4 +177,4 @@ def test_a_box_that_is_left_and_a_level_set_that_is_not() -> None:
     X = RNG.uniform(-1, 1, (2000, 2))
     X = X[np.einsum("ki,ij,kj->k", X, P, X) <= largest_level_inside(P, allowed)]
     assert len(X) > 100
-    assert allowed.contains(let_loose(A, X, 50).reshape(-1, 2)).all()
+    assert allowed.contains(simulate(A, X, 50).reshape(-1, 2)).all()

@@ -15,8 +15,8 @@ from labs.algorithms.markov_chain import (
     eigenvalues,
     is_irreducible,
     iterate_values,
-    long_run,
-    mean_costs,
+    long_run_distribution,
+    normalized_discounted_costs,
     stationary_distribution,
 )
 
@@ -155,7 +155,7 @@ def test_the_gamblers_ruin(p: float) -> None:
 @given(chains())
 @settings(deadline=None, max_examples=40)
 def test_the_long_run_is_the_mean_of_the_powers(P: np.ndarray) -> None:
-    exact = long_run(P, communicating_classes(P))
+    exact = long_run_distribution(P, communicating_classes(P))
     # 420 is a multiple of every period up to 7: the mean over so many steps, much later.
     blocks, step = np.zeros_like(P), np.eye(len(P))
     for _ in range(420):
@@ -217,7 +217,7 @@ def test_without_discount_only_what_ends_for_nothing_has_a_value() -> None:
     assert sweeps[-1].done == "Stopped at k = 30: V has no limit in 2 of 5 states."
     assert len(sweeps[-1].errors) == len(sweeps[-1].bounds) == 0
     # It grows by the mean cost of a step in the long run.
-    growth = mean_costs(P, C, np.array([1.0]), classes)[0]
+    growth = normalized_discounted_costs(P, C, np.array([1.0]), classes)[0]
     np.testing.assert_allclose(growth, [0.0, 0.0, 0.0, 0.1, 1.0])
     np.testing.assert_allclose(sweeps[29].V[3:] - sweeps[28].V[3:], growth[3:])
 
@@ -228,9 +228,9 @@ def test_mean_costs_go_from_the_own_cost_to_that_of_the_long_run(P: np.ndarray) 
     C = np.random.default_rng(len(P)).normal(size=len(P))
     classes = communicating_classes(P)
     gammas = np.array([0.0, 0.5, 1.0 - 1e-7, 1.0])
-    means = mean_costs(P, C, gammas, classes)
+    means = normalized_discounted_costs(P, C, gammas, classes)
     np.testing.assert_allclose(means[0], C, atol=1e-14)
     np.testing.assert_allclose(means[1], 0.5 * cost_to_go(P, C, 0.5, classes).V, atol=1e-13)
     # Abel: the limit is the mean of the long run.
     np.testing.assert_allclose(means[2], means[3], atol=1e-4)
-    assert math.isclose(means[3].max(), (long_run(P, classes) @ C).max())
+    assert math.isclose(means[3].max(), (long_run_distribution(P, classes) @ C).max())

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from labs.algorithms.linear_mpc import LinearPlanner
-from labs.algorithms.mpc import MpcOptions, RecedingHorizon, init, shift, step
+from labs.algorithms.mpc import MpcOptions, RecedingHorizonState, init, shift_plan, step
 from labs.errors import LabError
 from labs.problems.linear_mpc import LinearMpcProblem
 from labs.problems.receding_horizon import Plan, Planner
@@ -29,7 +29,7 @@ def close_loop(
     periods: int,
     brake: np.ndarray = REST,
     held: Sequence[int] = (),
-) -> tuple[np.ndarray, np.ndarray, list[RecedingHorizon]]:
+) -> tuple[np.ndarray, np.ndarray, list[RecedingHorizonState]]:
     """States, controls and controllers; in the `held` periods nothing is planned."""
     at, X, U, seen = init(options, REST), [np.array(x)], [], []
     for t in range(periods):
@@ -42,7 +42,7 @@ def close_loop(
 
 
 @dataclass
-class Spy:
+class RecordingPlanner:
     """A planner that keeps what it was asked, and finds nothing in some periods."""
 
     problem: LinearMpcProblem
@@ -58,7 +58,7 @@ class Spy:
 
 
 def test_the_first_control_acts_and_the_rest_is_the_next_guess() -> None:
-    spy = Spy(PROBLEM)
+    spy = RecordingPlanner(PROBLEM)
     X, U, seen = close_loop(spy, MpcOptions(), [1.5, 0.2], 25)
     assert np.abs(X[-1]).max() < 0.05
     for t, at in enumerate(seen):
@@ -78,10 +78,10 @@ def test_the_first_control_acts_and_the_rest_is_the_next_guess() -> None:
     _, same, _ = close_loop(LinearPlanner(PROBLEM), MpcOptions(warm=False), [1.5, 0.2], 25)
     np.testing.assert_allclose(same, U, atol=1e-10)
     options = MpcOptions(last="repeated")
-    repeated = shift(plan, 2, model, options)
+    repeated = shift_plan(plan, 2, model, options)
     assert repeated is not None
     np.testing.assert_array_equal(repeated.U[-3:, 0], np.repeat(plan.U[-1], 3))
-    assert shift(plan, len(plan.U), model, options) is None
+    assert shift_plan(plan, len(plan.U), model, options) is None
     warm, cold = (
         sum(
             s.plan.iterations
@@ -96,7 +96,7 @@ def test_the_first_control_acts_and_the_rest_is_the_next_guess() -> None:
 def test_a_horizon_that_shrinks_does_as_planned_and_one_that_recedes_does_not() -> None:
     """Bellman's principle; without a terminal cost the plans differ."""
     for shrink_from, same in ((10, True), (None, False)):
-        spy = Spy(DOUBLE_INTEGRATOR)
+        spy = RecordingPlanner(DOUBLE_INTEGRATOR)
         X, _, seen = close_loop(spy, MpcOptions(shrink_from=shrink_from), [1.0, 0.0], 10)
         first = seen[0].plan
         assert first is not None
@@ -106,7 +106,7 @@ def test_a_horizon_that_shrinks_does_as_planned_and_one_that_recedes_does_not() 
         assert guess is not None
         assert len(guess.U) == (7 if same else 10)
     # After its end it begins anew.
-    spy = Spy(DOUBLE_INTEGRATOR)
+    spy = RecordingPlanner(DOUBLE_INTEGRATOR)
     close_loop(spy, MpcOptions(shrink_from=3), [1.0, 0.0], 5)
     assert [N for *_, N in spy.asked] == [3, 2, 1, 3, 2]
 
@@ -125,7 +125,7 @@ def test_a_delay_that_is_compensated_only_shifts_the_run(delay: int) -> None:
 
 def test_a_delay_that_is_not_compensated_acts_late() -> None:
     options = MpcOptions(delay=2, compensate=False)
-    spy = Spy(PROBLEM)
+    spy = RecordingPlanner(PROBLEM)
     X, U, _ = close_loop(spy, options, [1.2, 0.1], 30)
     for t in range(5):
         np.testing.assert_array_equal(spy.asked[t][0], X[t])
@@ -137,7 +137,7 @@ def test_a_delay_that_is_not_compensated_acts_late() -> None:
 
 def test_without_a_plan_the_last_goes_on_or_the_brake_acts() -> None:
     missing, brake = (4, 5, 6), np.array([0.3])
-    _, U, seen = close_loop(Spy(PROBLEM, missing), MpcOptions(), [1.5, 0.2], 9, brake)
+    _, U, seen = close_loop(RecordingPlanner(PROBLEM, missing), MpcOptions(), [1.5, 0.2], 9, brake)
     plan = seen[3].plan
     assert plan is not None
     np.testing.assert_array_equal(U[3:7], plan.U[:4])
@@ -148,20 +148,24 @@ def test_without_a_plan_the_last_goes_on_or_the_brake_acts() -> None:
     assert not seen[7].status
     assert seen[8].failures == 3
     braking = MpcOptions(fallback="brake")
-    _, U, seen = close_loop(Spy(PROBLEM, missing), braking, [1.5, 0.2], 9, brake)
+    _, U, seen = close_loop(RecordingPlanner(PROBLEM, missing), braking, [1.5, 0.2], 9, brake)
     np.testing.assert_array_equal(U[4:7], 0.3)
     assert "Instead the brake acts." in seen[5].status
     # After its end a plan has no rest.
-    _, U, seen = close_loop(Spy(PROBLEM, range(1, 20)), MpcOptions(), [1.5, 0.2], 12, brake)
+    _, U, seen = close_loop(
+        RecordingPlanner(PROBLEM, range(1, 20)), MpcOptions(), [1.5, 0.2], 12, brake
+    )
     np.testing.assert_array_equal(U[10:], 0.3)
     assert "the brake acts" in seen[10].status
-    _, U, seen = close_loop(Spy(PROBLEM, range(20)), MpcOptions(), [1.5, 0.2], 3, brake)
+    _, U, seen = close_loop(
+        RecordingPlanner(PROBLEM, range(20)), MpcOptions(), [1.5, 0.2], 3, brake
+    )
     np.testing.assert_array_equal(U, 0.3)
     assert seen[-1].plan is None
 
 
 def test_periods_in_which_nothing_is_planned_follow_the_plan() -> None:
-    spy = Spy(PROBLEM)
+    spy = RecordingPlanner(PROBLEM)
     _, U, seen = close_loop(spy, MpcOptions(), [1.5, 0.2], 8, held=(1, 2, 3))
     plan = seen[0].plan
     assert plan is not None

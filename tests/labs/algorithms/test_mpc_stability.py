@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labs.algorithms.admissible_set import limits_under, maximal_output_admissible_set
+from labs.algorithms.admissible_set import closed_loop_limits, maximal_output_admissible_set
 from labs.algorithms.invariant_sets import feasible_sets
 from labs.algorithms.linear_mpc import LinearPlanner
 from labs.algorithms.polygons import vertices
@@ -31,7 +31,7 @@ UNSTABLE = LinearMpcProblem(
 def stabilising(problem: LinearMpcProblem) -> LinearMpcProblem:
     """With Riccati's P and the maximal set in which its gain meets all limits for ever."""
     P, K = riccati(problem)
-    limits = limits_under(K, problem.state_set, problem.control_set)
+    limits = closed_loop_limits(K, problem.state_set, problem.control_set)
     found = maximal_output_admissible_set(problem.A + problem.B @ K, limits)
     assert found.found
     return replace(problem, Q_f=P, terminal_set=found.set)

@@ -25,7 +25,7 @@ from tests.labs.algorithms.transcriptions import (
     minimum_energy,
     minimum_time,
     regulated_mass,
-    straight,
+    straight_guess,
 )
 from tests.labs.problems.continuous_problems import Circle, Disc, nonlinear
 
@@ -35,11 +35,11 @@ BALL = Ball(np.array([0.35, -0.1, 0.4]), 0.1)
 def solved(
     problem: ContinuousProblem, N: int, segments: int, M: int = 1, **options: Any
 ) -> tuple[MultipleShooting, SqpIterate]:
-    program, guess = MultipleShooting(problem, N, segments, M), straight(problem, N)
+    program, guess = MultipleShooting(problem, N, segments, M), straight_guess(problem, N)
     return program, sqp.solve(program, program.variables(guess.X, guess.U), SqpOptions(**options))
 
 
-def everything(name: str, rng: np.random.Generator) -> ContinuousProblem:
+def fully_constrained(name: str, rng: np.random.Generator) -> ContinuousProblem:
     """With all a problem may have, and a cost that is neither quadratic nor separable."""
     n = 4 if name == "cart-pole" else 2
     lower, upper, goal = np.full(n, -np.inf), np.full(n, np.inf), np.full(n, np.nan)
@@ -52,7 +52,7 @@ def everything(name: str, rng: np.random.Generator) -> ContinuousProblem:
 @pytest.mark.parametrize(("name", "method"), [("pendulum", "midpoint"), ("cart-pole", "rk4")])
 def test_derivatives_are_those_of_finite_differences(name: str, method: str, segments: int) -> None:
     rng = np.random.default_rng(1)
-    for problem in (everything(name, rng), nonlinear(rng, name)):
+    for problem in (fully_constrained(name, rng), nonlinear(rng, name)):
         program = MultipleShooting(problem, 5, segments, 2, method)
         z = 0.5 * rng.normal(size=program.n)
         z[-1] = 0.7 if program.free_time else z[-1]
@@ -73,7 +73,7 @@ def test_so_are_those_of_a_reach_around_a_ball() -> None:
 @pytest.mark.parametrize("form", ["augmented", "sum"])
 def test_one_segment_is_single_shooting(form: Any) -> None:
     rng = np.random.default_rng(2)
-    problem = everything("cart-pole", rng)
+    problem = fully_constrained("cart-pole", rng)
     multiple = MultipleShooting(problem, 6, 1, 2, "rk4", form)
     single = SingleShooting(problem, 6, 2, "rk4", form)
     y = single.pack(rng.normal(size=(6, 1)), 0.9)
@@ -188,7 +188,7 @@ def test_a_linear_quadratic_problem_takes_one_step_and_is_riccatis(
 ) -> None:
     problem = regulated_mass()
     cost: Any = problem.cost
-    program, guess = MultipleShooting(problem, 10, segments, 1, method), straight(problem, 10)
+    program, guess = MultipleShooting(problem, 10, segments, 1, method), straight_guess(problem, 10)
     at = sqp.solve(program, program.variables(guess.X, guess.U))
     assert (at.converged, at.iteration) == (True, 1)
     step = program.sensitivities(at.y).at
@@ -241,7 +241,7 @@ def test_a_guess_that_diverges_has_no_value() -> None:
 
 
 def test_uneven_segments_are_split_with_the_longer_ones_first_and_named() -> None:
-    problem = everything("cart-pole", np.random.default_rng(3))
+    problem = fully_constrained("cart-pole", np.random.default_rng(3))
     program = MultipleShooting(problem, 7, 3)
     np.testing.assert_array_equal(program.segments.lengths, [3, 2, 2])
     np.testing.assert_array_equal(program.segments.pieces, [0, 3, 5, 7])

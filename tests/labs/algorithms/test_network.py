@@ -7,10 +7,10 @@ import pytest
 
 from labs.algorithms.network import (
     adam_step,
-    backward,
+    backpropagate,
     forward,
-    no_moments,
     random_weights,
+    zero_moments,
 )
 
 
@@ -35,7 +35,7 @@ def test_gradients_are_those_of_finite_differences(sizes: tuple[int, ...]) -> No
     memory, gradient = np.empty(n * widths.sum()), np.empty_like(w)
     y = forward(widths, w, x, memory)
     np.testing.assert_allclose(y, plain_forward(widths, w, x), atol=1e-13)
-    backward(widths, w, memory, c, gradient)
+    backpropagate(widths, w, memory, c, gradient)
     for i in range(len(w)):
         sides = []
         for sign in (1.0, -1.0):
@@ -48,7 +48,7 @@ def test_gradients_are_those_of_finite_differences(sizes: tuple[int, ...]) -> No
 def test_adam_by_hand() -> None:
     """Two steps with g = 1, then g = -1: m = 0.1, then -0.01; s = 1e-3, then 1.999e-3; freed of
     their bias 1 and -0.01 / 0.19; 1 and 1."""
-    w, adam = np.array([5.0], np.float32), no_moments(1)
+    w, adam = np.array([5.0], np.float32), zero_moments(1)
     adam_step(adam, w, np.array([1.0], np.float32), 0.1)
     assert w[0] == pytest.approx(4.9, abs=1e-6)
     adam_step(adam, w, np.array([-1.0], np.float32), 0.1)
@@ -58,7 +58,11 @@ def test_adam_by_hand() -> None:
 
 
 def test_adam_alone_finds_the_least_of_a_parabola() -> None:
-    w, least, adam = np.zeros(3, np.float32), np.array([1.0, -2.0, 0.5], np.float32), no_moments(3)
+    w, least, adam = (
+        np.zeros(3, np.float32),
+        np.array([1.0, -2.0, 0.5], np.float32),
+        zero_moments(3),
+    )
     for _ in range(2000):
         adam_step(adam, w, w - least, 0.01)
     np.testing.assert_allclose(w, least, atol=1e-4)

@@ -12,13 +12,13 @@ from labs.algorithms.nonlinear_mpc import NonlinearMpc
 from labs.algorithms.nonlinear_mpc_problem import NonlinearMpcProblem
 from labs.algorithms.sqp import SqpOptions
 from labs.errors import LabError
-from labs.models.discrete import Discrete
+from labs.models.discrete import DiscreteMechanism
 from labs.models.mechanisms import mechanism
 from labs.problems.continuous_control import ContinuousProblem
 from labs.problems.receding_horizon import Plan
 from labs.resumable import run_to_completion
 from labs.tasks.motion.continuous_cost import ContinuousMotionCost
-from labs.tasks.motion.tip_constraints import Ball, OutsideBalls
+from labs.tasks.motion.tip_constraints import Ball, ObstacleConstraint
 
 H = 0.02
 UR5 = mechanism("ur5")
@@ -31,13 +31,13 @@ AT_HOME = np.concatenate([HOME, np.zeros(6)])
 def reach(N: int = 20, **changes: object) -> NonlinearMpcProblem:
     """The UR5 turns its joints, within limits that act."""
     problem = NonlinearMpcProblem(
-        Discrete(UR5, H),
+        DiscreteMechanism(UR5, H),
         N,
         Q=H * np.diag(np.repeat([10.0, 0.1], 6)),
         R=H * np.diag(0.1 / STRENGTH**2),
         Q_f=np.diag(np.repeat([30.0, 0.3], 6)),
         x_ref=np.concatenate([HOME + TURN, np.zeros(6)]),
-        u_ref=UR5.holding(HOME + TURN),
+        u_ref=UR5.equilibrium_control(HOME + TURN),
         x_lower=np.concatenate([HOME - 0.6, np.full(6, -1.0)]),
         x_upper=np.concatenate([HOME + 0.6, np.full(6, 1.0)]),
         u_lower=-0.5 * STRENGTH,
@@ -84,7 +84,7 @@ def test_it_solves_what_multiple_shooting_and_sqp_solve() -> None:
     guess = shooting.variables(np.tile(x0, (N + 1, 1)), np.zeros((N, 2)))
     other = sqp.solve(shooting, guess, SqpOptions(hessian="gauss-newton", tolerance=1e-9))
     assert other.converged
-    dynamics = Discrete(body, H, "explicit-euler")
+    dynamics = DiscreteMechanism(body, H, "explicit-euler")
     limits = (-x_upper, x_upper, -u_upper, u_upper)
     problem = NonlinearMpcProblem(dynamics, N, 2 * H * Q, 2 * H * R, 2 * Q_f, x_ref, u_ref, *limits)
     plan = planned(problem, x0)
@@ -108,7 +108,7 @@ def test_one_iteration_a_call_comes_to_the_same() -> None:
 
 def test_near_an_equilibrium_it_is_the_regulator() -> None:
     """u_0 = K x with Riccati's P as the terminal cost, for any N."""
-    dynamics = Discrete(mechanism("cart-pole"), H, "rk4")
+    dynamics = DiscreteMechanism(mechanism("cart-pole"), H, "rk4")
     x_ref = np.array([0.0, np.pi, 0.0, 0.0])
     _, A, B = dynamics.linearize(x_ref[None], np.zeros((1, 1)))
     Q, R, free = np.diag([1.0, 10.0, 0.1, 0.1]), np.array([[0.01]]), np.full(4, np.inf)
@@ -127,7 +127,7 @@ def test_near_an_equilibrium_it_is_the_regulator() -> None:
 
 def test_limits_are_held_and_lit() -> None:
     ball = Ball(UR5.tip(HOME + 0.5 * TURN) + np.array([0.02, 0.0, 0.0]), 0.1)
-    problem = reach(path=OutsideBalls(UR5, (ball,)))
+    problem = reach(path=ObstacleConstraint(UR5, (ball,)))
     assert problem.path
     X = closed_loop(problem, AT_HOME, 60)
     assert (X - problem.x_upper).max() < 1e-6
@@ -180,17 +180,17 @@ def test_a_plan_does_not_depend_on_those_before() -> None:
     planner = NonlinearMpc(reach())
     first = run_to_completion(planner.plan(AT_HOME, None))
     other = AT_HOME + 0.3
-    run_to_completion(planner.aimed(other, STRENGTH / 9.0).plan(AT_HOME + 0.01, first))
+    run_to_completion(planner.with_reference(other, STRENGTH / 9.0).plan(AT_HOME + 0.01, first))
     again = run_to_completion(planner.plan(AT_HOME, None))
     np.testing.assert_array_equal(again.X, first.X)
     np.testing.assert_array_equal(again.U, first.U)
 
 
 def test_another_aim_needs_no_other_planner() -> None:
-    x_ref, u_ref = AT_HOME + 0.1, UR5.holding(HOME + 0.1)
+    x_ref, u_ref = AT_HOME + 0.1, UR5.equilibrium_control(HOME + 0.1)
     planner = NonlinearMpc(reach())
     run_to_completion(planner.plan(AT_HOME, None))
-    plan = run_to_completion(planner.aimed(x_ref, u_ref).plan(AT_HOME, None))
+    plan = run_to_completion(planner.with_reference(x_ref, u_ref).plan(AT_HOME, None))
     new = planned(reach(x_ref=x_ref, u_ref=u_ref), AT_HOME, iterations=1)
     np.testing.assert_array_equal(plan.X, new.X)
     assert plan.cost == new.cost
@@ -209,7 +209,7 @@ def test_it_refuses_what_makes_no_sense() -> None:
 
 def test_the_linearisation_is_that_of_finite_differences() -> None:
     ball = Ball(UR5.tip(HOME) + np.array([0.05, 0.0, 0.0]), 0.1)
-    problem, rng = reach(N=2, path=OutsideBalls(UR5, (ball,))), np.random.default_rng(0)
+    problem, rng = reach(N=2, path=ObstacleConstraint(UR5, (ball,))), np.random.default_rng(0)
     planner = NonlinearMpc(problem)
     X = AT_HOME + 0.3 * rng.standard_normal((3, 12))
     U = 20.0 * rng.standard_normal((2, 6))

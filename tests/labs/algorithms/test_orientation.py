@@ -14,8 +14,8 @@ from labs.algorithms.orientation import (
     euler_axes,
     euler_rates,
     euler_to_matrix,
-    lock_sine,
-    lost_direction,
+    gimbal_lock_direction,
+    gimbal_lock_sine,
     matrix_to_angle_axis,
     matrix_to_euler,
     matrix_to_quaternion,
@@ -141,7 +141,9 @@ def test_the_axes_of_the_angles(sequence: str) -> None:
             ahead, behind = (euler_to_matrix(sequence, angles + f * step) for f in (1.0, -1.0))
             slope = (ahead - behind) / (2.0 * d)
             np.testing.assert_allclose(slope, skew(axes[:, i]) @ matrix, atol=1e-9)
-        assert abs(np.linalg.det(axes)) == pytest.approx(lock_sine(sequence, angles[1]), abs=1e-14)
+        assert abs(np.linalg.det(axes)) == pytest.approx(
+            gimbal_lock_sine(sequence, angles[1]), abs=1e-14
+        )
 
 
 @every_sequence
@@ -164,7 +166,7 @@ def test_the_amplification_law(sequence: str) -> None:
     for theta in (0.3, 1.0, 1.5, 1.55, 0.02):
         inverse = np.linalg.inv(euler_axes(sequence, np.array([0.7, theta, -0.4])))
         lengths = np.linalg.norm(inverse, axis=1)
-        law = 1.0 / lock_sine(sequence, theta)
+        law = 1.0 / gimbal_lock_sine(sequence, theta)
         np.testing.assert_allclose(lengths, [law, 1.0, law], rtol=1e-11)
 
 
@@ -172,7 +174,7 @@ def test_the_amplification_law(sequence: str) -> None:
 def test_the_lost_direction(sequence: str) -> None:
     lock = np.pi / 2 if sequence[2] != sequence[0] else 0.0
     axes = euler_axes(sequence, np.array([0.7, lock, -0.4]))
-    lost = lost_direction(sequence, 0.7)
+    lost = gimbal_lock_direction(sequence, 0.7)
     assert np.linalg.norm(lost) == pytest.approx(1.0, abs=1e-15)
     np.testing.assert_allclose(lost @ axes, 0.0, atol=1e-15)
     # Close to the lock it is where the law's worst case is met.

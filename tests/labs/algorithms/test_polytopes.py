@@ -7,8 +7,14 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from labs.algorithms import polygons, polytopes
-from labs.algorithms.polygons import Unbounded, from_vertices, hull, minkowski_sum, vertices
-from labs.algorithms.polytopes import pontryagin_difference, without_redundant_rows
+from labs.algorithms.polygons import (
+    UnboundedError,
+    convex_hull,
+    minkowski_sum,
+    polyhedron_from_vertices,
+    vertices,
+)
+from labs.algorithms.polytopes import pontryagin_difference, remove_redundant_rows
 from labs.errors import LabError
 from labs.problems.polyhedron import Polyhedron, box
 
@@ -48,7 +54,7 @@ def test_vertices_and_area_are_those_of_the_library(scale: float) -> None:
         assert farthest_from(polygon, expected) <= 1e-9 * scale
         area = ConvexHull(expected / scale).volume * scale**2
         assert polygons.area(polygon) == pytest.approx(area, rel=1e-9)
-        again = vertices(from_vertices(polygon))
+        again = vertices(polyhedron_from_vertices(polygon))
         assert len(again) == len(polygon)
         assert farthest_from(again, polygon) <= 1e-12 * scale
         following = np.roll(polygon, -1, axis=0) - polygon
@@ -62,7 +68,7 @@ def test_rows_are_redundant_where_the_library_says_so(n: int) -> None:
     rng = np.random.default_rng(n)
     for _ in range(4):
         polyhedron = random_polyhedron(rng, n, 8)
-        least = without_redundant_rows(polyhedron)
+        least = remove_redundant_rows(polyhedron)
         expected = polytope.reduce(oracle(polyhedron))
         assert len(least.h) == len(expected.b)
         assert farthest_from(np.c_[least.H, least.h], np.c_[expected.A, expected.b]) <= 1e-7
@@ -90,7 +96,9 @@ def test_the_support_function_and_what_includes_what() -> None:
         reach = polytopes.support(polyhedron, directions)
         corners = vertices(polyhedron)
         assert reach == pytest.approx(polygons.support_of_points(corners, directions), abs=1e-8)
-        shrunk = from_vertices(0.999 * (corners - corners.mean(axis=0)) + corners.mean(axis=0))
+        shrunk = polyhedron_from_vertices(
+            0.999 * (corners - corners.mean(axis=0)) + corners.mean(axis=0)
+        )
         assert polytopes.includes(polyhedron, shrunk)
         assert not polytopes.includes(shrunk, polyhedron)
         assert polytopes.includes(shrunk, polyhedron, tolerance=0.01)
@@ -99,7 +107,7 @@ def test_the_support_function_and_what_includes_what() -> None:
 def test_sum_and_difference_meet_their_definitions() -> None:
     rng = np.random.default_rng(4)
     for _ in range(10):
-        P, W = random_polyhedron(rng, 2, 5), hull(0.2 * rng.normal(size=(6, 2)))
+        P, W = random_polyhedron(rng, 2, 5), convex_hull(0.2 * rng.normal(size=(6, 2)))
         V = vertices(P)
         summed = minkowski_sum(V, W)
         directions = rng.normal(size=(50, 2))
@@ -111,8 +119,8 @@ def test_sum_and_difference_meet_their_definitions() -> None:
         X = rng.uniform(-4.0, 4.0, (500, 2))
         fits = P.contains(X[:, None] + W[None]).all(axis=1)
         assert (left.contains(X) == fits).all()
-        assert polytopes.includes(P, from_vertices(minkowski_sum(vertices(left), W)))
-    regrown = pontryagin_difference(from_vertices(summed), W)
+        assert polytopes.includes(P, polyhedron_from_vertices(minkowski_sum(vertices(left), W)))
+    regrown = pontryagin_difference(polyhedron_from_vertices(summed), W)
     assert farthest_from(vertices(regrown), V) <= 1e-9
 
 
@@ -123,24 +131,24 @@ def test_flat_sets_stay_what_they_are() -> None:
     turn = np.array([[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]])
     slanted = vertices(still) @ turn.T
     for flat in (vertices(origin), vertices(still), slanted, slanted[:1]):
-        assert farthest_from(vertices(from_vertices(flat)), flat) <= 1e-12
+        assert farthest_from(vertices(polyhedron_from_vertices(flat)), flat) <= 1e-12
         assert polygons.area(flat) == 0.0
     grown = minkowski_sum(slanted, vertices(box([-0.1, -0.1], [0.1, 0.1])))
     assert len(grown) == 6
-    for flat in (origin, still, from_vertices(slanted)):
-        assert polytopes.includes(without_redundant_rows(flat), flat)
-        assert polytopes.includes(flat, without_redundant_rows(flat))
-    assert len(hull(np.zeros((5, 2)))) == 1
-    assert len(hull(np.outer(np.arange(5.0), [1.0, 2.0]))) == 2
+    for flat in (origin, still, polyhedron_from_vertices(slanted)):
+        assert polytopes.includes(remove_redundant_rows(flat), flat)
+        assert polytopes.includes(flat, remove_redundant_rows(flat))
+    assert len(convex_hull(np.zeros((5, 2)))) == 1
+    assert len(convex_hull(np.outer(np.arange(5.0), [1.0, 2.0]))) == 2
 
 
 def test_empty_and_unbounded_sets_are_told() -> None:
     assert polytopes.is_empty(EMPTY)
     assert len(vertices(EMPTY)) == 0
     assert (polytopes.support(EMPTY, np.eye(2)) == -np.inf).all()
-    assert not without_redundant_rows(EMPTY).contains(np.zeros(2))
-    assert not from_vertices(np.zeros((0, 2))).contains(np.zeros(2))
-    assert len(vertices(from_vertices(np.zeros((0, 2))))) == 0
+    assert not remove_redundant_rows(EMPTY).contains(np.zeros(2))
+    assert not polyhedron_from_vertices(np.zeros((0, 2))).contains(np.zeros(2))
+    assert len(vertices(polyhedron_from_vertices(np.zeros((0, 2))))) == 0
     assert len(minkowski_sum(np.zeros((0, 2)), np.eye(2))) == 0
     assert (
         len(vertices(pontryagin_difference(box([0, 0], [1, 1]), np.array([[0, 0], [2, 0]])))) == 0
@@ -149,7 +157,7 @@ def test_empty_and_unbounded_sets_are_told() -> None:
     for unbounded in (plane, strip, box([-np.inf, -1.0], [0.0, 1.0])):
         assert not polytopes.is_bounded(unbounded)
         assert not polytopes.is_empty(unbounded)
-        with pytest.raises(Unbounded, match="reaches to infinity"):
+        with pytest.raises(UnboundedError, match="reaches to infinity"):
             vertices(unbounded)
     assert polytopes.support(strip, np.eye(2)).tolist() == [1.0, np.inf]
     assert polytopes.includes(plane, strip)

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from labs.algorithms.prediction import (
+    ELIGIBILITY_TRACES,
     EVERY_VISIT,
     FIRST_VISIT,
     LAMBDA_RETURN,
     N_STEP,
     TD0,
-    TRACES,
     TRUE_ONLINE,
     Predictors,
     init,
-    on_policy,
+    on_policy_task,
     step,
 )
 from labs.errors import LabError
@@ -27,10 +27,10 @@ from labs.problems.prediction import (
     prediction_task,
     sample_episode,
 )
-from labs.tasks.random_walk.walks import FIVE, NINETEEN, walk_mdp, walk_task
+from labs.tasks.random_walk.walks import FIVE_STATE_WALK, NINETEEN_STATE_WALK, walk_mdp, walk_task
 
 GAMMA = 0.9
-METHODS = (FIRST_VISIT, EVERY_VISIT, TD0, N_STEP, LAMBDA_RETURN, TRACES, TRUE_ONLINE)
+METHODS = (FIRST_VISIT, EVERY_VISIT, TD0, N_STEP, LAMBDA_RETURN, ELIGIBILITY_TRACES, TRUE_ONLINE)
 
 
 def task(horizon: int = 10_000) -> PredictionTask:
@@ -41,10 +41,10 @@ def task(horizon: int = 10_000) -> PredictionTask:
     cost = rng.uniform(-1.0, 2.0, (5, 2))
     cost[4] = 0.0
     mdp = FiniteMDP(cost, GAMMA, np.arange(5) == 4, P=P)
-    return on_policy(mdp, rng.dirichlet(np.ones(2), 5), [0, 1, 2, 3], horizon)
+    return on_policy_task(mdp, rng.dirichlet(np.ones(2), 5), [0, 1, 2, 3], horizon)
 
 
-def opinionated(task: PredictionTask, seeds: int = 1, seed: int = 3) -> Predictors:
+def random_learners(task: PredictionTask, seeds: int = 1, seed: int = 3) -> Predictors:
     """Learners with some opinion already."""
     learners = init(task, seeds, np.random.default_rng(seed))
     V = np.random.default_rng(4).uniform(0.0, 5.0, learners.V.shape)
@@ -84,7 +84,7 @@ def lambda_return(V: np.ndarray, xs: list[int], costs: list[float], t: int, lam:
 def test_n_step_td_does_what_it_says(n: int, horizon: int) -> None:
     """In the order of the book: a state is updated when its n costs are there."""
     walk = task(horizon)
-    before = opinionated(walk)
+    before = random_learners(walk)
     V, N = before.V[0].copy(), np.zeros(5)
     for xs, costs in first_episodes(walk, before, 20):
         T = len(costs)
@@ -121,7 +121,7 @@ def test_true_online_is_the_forward_view_at_every_step() -> None:
     """Against the online lambda-return algorithm: with each new step everything is done anew from
     the start of the episode, with the lambda-returns cut there."""
     walk, alpha, lam = task(), 0.3, 0.8
-    before = opinionated(walk)
+    before = random_learners(walk)
     V = before.V[0].copy()
     for xs, costs in first_episodes(walk, before, 6):
         values = [V.copy()]  # V_h, each from V_0
@@ -145,7 +145,7 @@ def test_true_online_is_the_forward_view_at_every_step() -> None:
 @pytest.mark.parametrize("lam", [0.0, 0.4, 0.9, 1.0])
 def test_forward_and_backward_view_agree_offline(lam: float, horizon: int) -> None:
     walk = task(horizon)
-    before = opinionated(walk)
+    before = random_learners(walk)
     ((xs, costs),) = first_episodes(walk, before, 1)
     V = before.V[0]
     assert len(set(xs)) < len(xs), "some state comes again"
@@ -154,11 +154,11 @@ def test_forward_and_backward_view_agree_offline(lam: float, horizon: int) -> No
         expected[x] += 0.2 * (lambda_return(V, xs, costs, t, lam) - V[x])
     rule = UpdateRule(0.2, trace_decay=lam, offline=True)
     forward = step(walk, rule, LAMBDA_RETURN, before, 1).V[0]
-    backward = step(walk, rule, TRACES, before, 1).V[0]
+    backward = step(walk, rule, ELIGIBILITY_TRACES, before, 1).V[0]
     np.testing.assert_allclose(forward, expected, rtol=1e-13)
     np.testing.assert_allclose(backward, forward, rtol=1e-12)
     online = rule._replace(offline=False)
-    gap = np.abs(step(walk, online, TRACES, before, 1).V - backward).max()
+    gap = np.abs(step(walk, online, ELIGIBILITY_TRACES, before, 1).V - backward).max()
     assert gap > 1e-3, "online it is another update"
 
 
@@ -168,11 +168,11 @@ def test_forward_and_backward_view_agree_offline(lam: float, horizon: int) -> No
 @pytest.mark.parametrize("offline", [True, False])
 @pytest.mark.parametrize("omega", [0.0, 0.8])
 def test_td0_is_one_step_and_lambda_zero_bit_for_bit(omega: float, offline: bool) -> None:
-    for walk in (task(), task(5), walk_task(NINETEEN)):
+    for walk in (task(), task(5), walk_task(NINETEEN_STATE_WALK)):
         rule = UpdateRule(0.3, omega, n=1, trace_decay=0.0, offline=offline)
-        before = opinionated(walk, seeds=5)
+        before = random_learners(walk, seeds=5)
         td = step(walk, rule, TD0, before, 10)
-        same = [N_STEP, TRACES] + ([LAMBDA_RETURN] if offline else [])
+        same = [N_STEP, ELIGIBILITY_TRACES] + ([LAMBDA_RETURN] if offline else [])
         for method in same:
             other = step(walk, rule, method, before, 10)
             assert np.array_equal(other.V, td.V), method
@@ -181,9 +181,9 @@ def test_td0_is_one_step_and_lambda_zero_bit_for_bit(omega: float, offline: bool
 
 @pytest.mark.parametrize("offline", [True, False])
 def test_monte_carlo_is_all_steps_and_lambda_one_bit_for_bit(offline: bool) -> None:
-    for walk in (task(), walk_task(NINETEEN)):
+    for walk in (task(), walk_task(NINETEEN_STATE_WALK)):
         rule = UpdateRule(0.1, n=10**6, trace_decay=1.0, offline=offline)
-        before = opinionated(walk, seeds=5)
+        before = random_learners(walk, seeds=5)
         monte_carlo = step(walk, rule, EVERY_VISIT, before, 10)
         for method in (N_STEP, LAMBDA_RETURN):
             other = step(walk, rule, method, before, 10)
@@ -191,14 +191,16 @@ def test_monte_carlo_is_all_steps_and_lambda_one_bit_for_bit(offline: bool) -> N
         if offline:
             # Offline, the traces of a long walk may leave all bounds; one episode shows the rest.
             one = step(walk, rule, EVERY_VISIT, before, 1)
-            np.testing.assert_allclose(step(walk, rule, TRACES, before, 1).V, one.V, rtol=1e-10)
+            np.testing.assert_allclose(
+                step(walk, rule, ELIGIBILITY_TRACES, before, 1).V, one.V, rtol=1e-10
+            )
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_learning_can_be_interrupted_and_leaves_the_old_learners_alone(method: int) -> None:
     walk = task()
     rule = UpdateRule(0.3, 0.6, n=3, trace_decay=0.6)
-    start = opinionated(walk, seeds=4)
+    start = random_learners(walk, seeds=4)
     kept = start.V.copy()
     whole = step(walk, rule, method, start, 30)
     half = step(walk, rule, method, start, 17)
@@ -219,7 +221,7 @@ def test_monte_carlo_learns_nothing_from_an_episode_that_was_cut() -> None:
     endless = FiniteMDP(
         np.ones((2, 1)), 0.5, np.zeros(2, bool), successor=np.array([[1], [0]], np.int32)
     )
-    loop = on_policy(endless, np.zeros(2, int), [0], 50)
+    loop = on_policy_task(endless, np.zeros(2, int), [0], 50)
     before = init(loop, 1, np.random.default_rng(0))
     for method in (FIRST_VISIT, EVERY_VISIT):
         assert not step(loop, UpdateRule(0.5), method, before, 10).V.any()
@@ -228,32 +230,32 @@ def test_monte_carlo_learns_nothing_from_an_episode_that_was_cut() -> None:
 
 
 def test_accumulating_traces_may_diverge_and_say_so() -> None:
-    walk = walk_task(NINETEEN)
+    walk = walk_task(NINETEEN_STATE_WALK)
     rule = UpdateRule(1.0, trace_decay=1.0, limit=1e6)
     start = init(walk, 20, np.random.default_rng(0))
-    after = step(walk, rule, TRACES, start, 10)
-    assert not after.sound.any()
+    after = step(walk, rule, ELIGIBILITY_TRACES, start, 10)
+    assert not after.bounded.any()
     assert (np.abs(after.V) <= 1e6).all()
     assert np.isinf(after.errors[:, -1]).all()
-    again = step(walk, rule, TRACES, after, 2)
+    again = step(walk, rule, ELIGIBILITY_TRACES, after, 2)
     assert np.array_equal(again.V, after.V)
-    assert step(walk, rule._replace(replacing=True), TRACES, start, 10).sound.all()
+    assert step(walk, rule._replace(replacing=True), ELIGIBILITY_TRACES, start, 10).bounded.all()
 
 
 def test_what_does_not_fit_is_refused() -> None:
-    five, nineteen = walk_task(FIVE), walk_task(NINETEEN)
+    five, nineteen = walk_task(FIVE_STATE_WALK), walk_task(NINETEEN_STATE_WALK)
     learners = init(five, 1, np.random.default_rng(0))
     for where, rule, method, words in (
         (nineteen, UpdateRule(), TD0, "must agree"),
         (five, UpdateRule(alpha=1.5), TD0, "alpha = 1.5"),
-        (five, UpdateRule(trace_decay=-1.0), TRACES, "lambda = -1"),
+        (five, UpdateRule(trace_decay=-1.0), ELIGIBILITY_TRACES, "lambda = -1"),
         (five, UpdateRule(n=0), N_STEP, "n = 0"),
         (five, UpdateRule(offline=True), TRUE_ONLINE, "no offline form"),
         (five, UpdateRule(), 7, "no method 7"),
     ):
         with pytest.raises(LabError, match=words):
             step(where, rule, method, learners, 1)
-    mdp = walk_mdp(FIVE)
+    mdp = walk_mdp(FIVE_STATE_WALK)
     right, even = np.tile([0.0, 1.0], (7, 1)), np.full((7, 2), 0.5)
     with pytest.raises(LabError, match="never tries"):
         prediction_task(mdp, right, five.truth, [3], 10, target=even)

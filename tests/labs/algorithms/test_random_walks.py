@@ -14,22 +14,24 @@ from labs.algorithms.prediction import (
     step,
 )
 from labs.problems.episodes import UpdateRule
-from labs.tasks.random_walk.walks import FIVE, NINETEEN, WalkShape, walk_task
+from labs.tasks.random_walk.walks import FIVE_STATE_WALK, NINETEEN_STATE_WALK, WalkShape, walk_task
 
 RUNS = 400
 
 
 def errors(
-    method: int, rule: UpdateRule, episodes: int = 10, walk: WalkShape = NINETEEN
+    method: int, rule: UpdateRule, episodes: int = 10, walk: WalkShape = NINETEEN_STATE_WALK
 ) -> tuple[float, float]:
     """Mean error over the first episodes, and its standard error, of RUNS learners."""
     task = walk_task(walk)
-    learners = init(task, RUNS, np.random.default_rng(11), v0=-0.5 if walk == FIVE else 0.0)
+    learners = init(
+        task, RUNS, np.random.default_rng(11), v0=-0.5 if walk == FIVE_STATE_WALK else 0.0
+    )
     found = step(task, rule, method, learners, episodes).errors.mean(axis=1)
     return float(found.mean()), float(found.std() / np.sqrt(RUNS))
 
 
-def by_the_book(n: int, alpha: float, runs: int) -> np.ndarray:
+def reference_n_step_td(n: int, alpha: float, runs: int) -> np.ndarray:
     """n-step TD on 19 states in plain Python, statement by statement as in the book's box, with
     other random numbers: (runs,) mean RMS error over the first 10 episodes."""
     luck, truth = np.random.default_rng(99), np.linspace(-0.9, 0.9, 19)
@@ -60,7 +62,7 @@ def by_the_book(n: int, alpha: float, runs: int) -> np.ndarray:
 def test_the_nineteen_states_give_the_errors_of_the_book_s_pseudo_code(
     n: int, alpha: float
 ) -> None:
-    book = by_the_book(n, alpha, 100)
+    book = reference_n_step_td(n, alpha, 100)
     mean, deviation = errors(N_STEP, UpdateRule(alpha, n=n))
     assert mean == pytest.approx(book.mean(), abs=3.5 * np.hypot(deviation, book.std() / 10))
 
@@ -96,10 +98,13 @@ def test_an_intermediate_lambda_is_best() -> None:
 def test_td_beats_monte_carlo_on_five_states() -> None:
     """Example 6.2 of Sutton and Barto, 100 episodes: each curve of TD(0) (alpha 0.05, 0.1, 0.15) is
     below each of MC (0.01 to 0.04) in the mean; all begin at 0.2357."""
-    td = [errors(TD0, UpdateRule(a), 100, FIVE)[0] for a in (0.05, 0.1, 0.15)]
-    mc = [errors(EVERY_VISIT, UpdateRule(a), 100, FIVE)[0] for a in (0.01, 0.02, 0.03, 0.04)]
+    td = [errors(TD0, UpdateRule(a), 100, FIVE_STATE_WALK)[0] for a in (0.05, 0.1, 0.15)]
+    mc = [
+        errors(EVERY_VISIT, UpdateRule(a), 100, FIVE_STATE_WALK)[0]
+        for a in (0.01, 0.02, 0.03, 0.04)
+    ]
     assert max(td) < min(mc)
-    task = walk_task(FIVE)
+    task = walk_task(FIVE_STATE_WALK)
     learners = init(task, RUNS, np.random.default_rng(0), v0=-0.5)
     before = step(task, UpdateRule(0.0), TD0, learners, 1).errors
     np.testing.assert_allclose(before, np.sqrt((2 / 9 + 2 / 36) / 5))
@@ -110,7 +115,7 @@ def test_td_beats_monte_carlo_on_five_states() -> None:
 def test_monte_carlo_is_unbiased_and_td_is_not_but_varies_less() -> None:
     """After 5 episodes of 20 000 learners: first-visit means lie at the truth within their standard
     errors (a state that was not seen counts for nothing); TD(0) still leans on its first guess."""
-    task, many = walk_task(FIVE), 20_000
+    task, many = walk_task(FIVE_STATE_WALK), 20_000
     start = init(task, many, np.random.default_rng(2))
     mc = step(task, UpdateRule(1.0, omega=1.0), FIRST_VISIT, start, 5)
     td = step(task, UpdateRule(0.1), TD0, start, 5)
@@ -123,7 +128,7 @@ def test_monte_carlo_is_unbiased_and_td_is_not_but_varies_less() -> None:
 
 
 def test_robbins_monro_steps_converge_and_constant_ones_stay_noisy() -> None:
-    task = walk_task(FIVE)
+    task = walk_task(FIVE_STATE_WALK)
     start = init(task, 20, np.random.default_rng(3))
     falling = step(task, UpdateRule(1.0, omega=0.8), TD0, start, 20_000)
     constant = step(task, UpdateRule(0.1), TD0, start, 20_000)

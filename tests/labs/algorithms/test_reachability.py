@@ -12,7 +12,7 @@ from labs.algorithms.markov_chain import (
     communicating_classes,
     cost_to_go,
     iterate_values,
-    long_run,
+    long_run_distribution,
 )
 from labs.problems.finite_mdp import FiniteMDP
 
@@ -65,7 +65,7 @@ def solve(A: list[list[Fraction]], b: list[Fraction]) -> list[Fraction]:
     return [row[n] for row in rows]
 
 
-def exactly(weights: Weights, states: list[int], b: list[Fraction]) -> list[Fraction]:
+def solve_exactly(weights: Weights, states: list[int], b: list[Fraction]) -> list[Fraction]:
     """(I - P_TT)^-1 b for the states T."""
     P = [[Fraction(w, sum(row)) for w in row] for row in weights]
     return solve([[Fraction(x == y) - P[x][y] for y in states] for x in states], b)
@@ -83,11 +83,11 @@ def test_probabilities_of_absorption_are_exact_and_0_where_no_way_leads(seed: in
         into = [
             sum((Fraction(weights[x][y], sum(weights[x])) for y in c), Fraction(0)) for x in states
         ]
-        wanted = exactly(weights, states, into)
+        wanted = solve_exactly(weights, states, into)
         for x, p in zip(states, wanted, strict=True):
             assert (found[x, k] == 0.0) == (p == 0)
             assert found[x, k] == pytest.approx(float(p), rel=1e-13, abs=0.0)
-    shares = long_run(P, classes)
+    shares = long_run_distribution(P, classes)
     assert ((shares[:, states] == 0.0).all()) or not states
 
 
@@ -101,10 +101,10 @@ def test_costs_without_discount_are_finite_where_they_are_and_exact(seed: int) -
     finite: np.ndarray = hops[:, costly].sum(axis=1) == 0
     found = cost_to_go(P, C, 1.0, communicating_classes(P))
     np.testing.assert_array_equal(found.finite, finite)
-    np.testing.assert_array_equal(np.isfinite(found.known), finite)
+    np.testing.assert_array_equal(np.isfinite(found.values_or_nan), finite)
     ended = {int(x) for c in closed for x in c}
     states = [x for x in range(len(P)) if finite[x] and x not in ended]
-    wanted = exactly(weights, states, [Fraction(float(C[x])) for x in states])
+    wanted = solve_exactly(weights, states, [Fraction(float(C[x])) for x in states])
     V = np.zeros(len(P))
     V[states] = [float(v) for v in wanted]
     np.testing.assert_allclose(found.V, V, rtol=1e-13, atol=0.0)
@@ -112,7 +112,7 @@ def test_costs_without_discount_are_finite_where_they_are_and_exact(seed: int) -
     mdp = FiniteMDP(C[:, None], 1.0, np.zeros(len(P), bool), P=P[None])
     policy = np.zeros(len(P), np.int64)
     np.testing.assert_allclose(
-        policy_evaluation.exact(mdp, policy), np.where(finite, V, np.inf), rtol=1e-13
+        policy_evaluation.exact_values(mdp, policy), np.where(finite, V, np.inf), rtol=1e-13
     )
 
 
@@ -133,7 +133,7 @@ def test_a_state_that_is_sure_to_end_has_a_value_whatever_rounding_says() -> Non
     P = np.array([[1.0, 0, 0, 0], [0.2, 0.8, 0, 0], [0.1, 0.4, 0.3, 0.2], [0, 0, 0, 1.0]])
     found = cost_to_go(P, np.array([0.0, 1.0, 1.0, 5.0]), 1.0, communicating_classes(P))
     np.testing.assert_array_equal(found.finite, [True, True, False, False])
-    np.testing.assert_allclose(found.known, [0.0, 5.0, np.nan, np.nan], rtol=1e-15)
+    np.testing.assert_allclose(found.values_or_nan, [0.0, 5.0, np.nan, np.nan], rtol=1e-15)
 
 
 @pytest.mark.parametrize("leak", [1e-3, 1e-15, 1e-17, 1e-200])
@@ -174,11 +174,11 @@ def test_costs_that_cancel_under_a_policy_are_no_costs() -> None:
     mdp = FiniteMDP(np.array([[7.0, -3.0]]), 1.0, np.zeros(1, bool), P=P)
     policy = np.array([[0.3, 0.7]])
     assert (policy * mdp.C).sum() != 0.0
-    np.testing.assert_array_equal(policy_evaluation.exact(mdp, policy), [0.0])
+    np.testing.assert_array_equal(policy_evaluation.exact_values(mdp, policy), [0.0])
 
 
 def test_a_cycle_whose_costs_cancel_without_resting_has_no_value() -> None:
     successor = np.array([[1], [0]], np.int32)
     mdp = FiniteMDP(np.array([[1.0], [-1.0]]), 1.0, np.zeros(2, bool), successor=successor)
-    assert not np.isfinite(policy_evaluation.exact(mdp, np.zeros(2, np.int64))).any()
-    assert not np.isnan(policy_evaluation.exact(mdp, np.zeros(2, np.int64))).any()
+    assert not np.isfinite(policy_evaluation.exact_values(mdp, np.zeros(2, np.int64))).any()
+    assert not np.isnan(policy_evaluation.exact_values(mdp, np.zeros(2, np.int64))).any()

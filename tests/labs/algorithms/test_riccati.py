@@ -10,11 +10,11 @@ from hypothesis.extra.numpy import arrays
 from qpsolvers import Problem, solve_problem
 from scipy.linalg import block_diag, solve_discrete_are
 
-from labs.algorithms.least_squares_lqr import solve_at_once, trajectory_map
-from labs.algorithms.riccati import solve, steady_state, steady_state_directly
-from labs.algorithms.stabilizability import hidden_modes
+from labs.algorithms.least_squares_lqr import prediction_matrices, solve_least_squares
+from labs.algorithms.riccati import solve, steady_state, steady_state_by_scipy
+from labs.algorithms.stabilizability import unstabilizable_modes
 from labs.errors import LabError
-from labs.problems.linear_quadratic import LqrPolicy, LqrProblem, tracking
+from labs.problems.linear_quadratic import LqrPolicy, LqrProblem, tracking_problem
 
 ONE = np.eye(1)
 
@@ -118,7 +118,7 @@ def test_the_steady_state_is_scipys(seed: int) -> None:
     p = stationary(seed, n=6, m=3)
     expected = solve_discrete_are(p.a, p.b, p.q, p.r)
     gain = -np.linalg.solve(p.r + p.b.T @ expected @ p.b, p.b.T @ expected @ p.a)
-    for found in (steady_state(p.a, p.b, p.q, p.r), steady_state_directly(p.a, p.b, p.q, p.r)):
+    for found in (steady_state(p.a, p.b, p.q, p.r), steady_state_by_scipy(p.a, p.b, p.q, p.r)):
         np.testing.assert_allclose(found.value, expected, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(found.gain, gain, rtol=1e-9, atol=1e-9)
         assert found.residual < 1e-10
@@ -137,16 +137,16 @@ def test_a_long_horizon_begins_in_the_steady_state(seed: int) -> None:
 def test_riccati_is_the_least_squares_solution(seed: int) -> None:
     p = stationary(seed)
     x0 = np.random.default_rng(seed).normal(size=p.n)
-    _, u = p.follow(solve(p), x0)
-    np.testing.assert_allclose(u, solve_at_once(p, x0), rtol=1e-9, atol=1e-9)
+    _, u = p.rollout(solve(p), x0)
+    np.testing.assert_allclose(u, solve_least_squares(p, x0), rtol=1e-9, atol=1e-9)
 
 
 def test_riccati_is_the_least_squares_solution_of_a_varying_system() -> None:
     g = general(3)
     p = LqrProblem(g.horizon, g.a, g.b, g.q, g.r, g.q_final)
     x0 = np.array([1.0, -2.0, 0.5])
-    _, u = p.follow(solve(p), x0)
-    np.testing.assert_allclose(u, solve_at_once(p, x0), rtol=1e-9, atol=1e-9)
+    _, u = p.rollout(solve(p), x0)
+    np.testing.assert_allclose(u, solve_least_squares(p, x0), rtol=1e-9, atol=1e-9)
 
 
 def test_the_trajectory_map_is_the_dynamics() -> None:
@@ -156,7 +156,7 @@ def test_the_trajectory_map_is_the_dynamics() -> None:
     x, u = [rng.normal(size=p.n)], rng.normal(size=(p.horizon, p.m))
     for t in range(p.horizon):
         x.append(g.a[t] @ x[t] + g.b[t] @ u[t])
-    h, big_g = trajectory_map(p)
+    h, big_g = prediction_matrices(p)
     np.testing.assert_allclose(h @ x[0] + big_g @ u.ravel(), np.ravel(x[1:]), atol=1e-12)
 
 
@@ -165,7 +165,7 @@ def test_all_terms_together_are_the_qp(seed: int) -> None:
     p = general(seed)
     x0 = np.random.default_rng(seed).normal(size=p.n)
     policy = solve(p)
-    x, u = p.follow(policy, x0)
+    x, u = p.rollout(policy, x0)
     x_qp, u_qp = optimum(p, x0)
     np.testing.assert_allclose(x, x_qp, atol=1e-8)
     np.testing.assert_allclose(u, u_qp, atol=1e-8)
@@ -178,7 +178,7 @@ def test_all_terms_together_fulfil_the_optimality_conditions(seed: int) -> None:
     and every lambda is the cost of its state plus what it hands on."""
     p = general(seed)
     policy = solve(p)
-    x, u = p.follow(policy, np.random.default_rng(seed).normal(size=p.n))
+    x, u = p.rollout(policy, np.random.default_rng(seed).normal(size=p.n))
     multiplier = np.einsum("tij,tj->ti", policy.values, x) + policy.linear
     for t in range(p.horizon):
         term = {name: stack[t % len(stack)] for name, stack in p.terms.items()}
@@ -196,10 +196,10 @@ def test_tracking_is_the_qp_of_the_differences(seed: int) -> None:
     x_ref, u_ref = rng.normal(size=(steps + 1, n)), rng.normal(size=(steps, m))
     a, b, c = rng.normal(size=(n, n)) * 0.6, rng.normal(size=(n, m)), rng.normal(size=n)
     q, r, q_final = weight(rng, n), weight(rng, m), weight(rng, n)
-    p = tracking(steps, (a, b, c), (q, r, q_final), x_ref, u_ref)
+    p = tracking_problem(steps, (a, b, c), (q, r, q_final), x_ref, u_ref)
     x0 = rng.normal(size=n)
     policy = solve(p)
-    x, u = p.follow(policy, x0)
+    x, u = p.rollout(policy, x0)
     by_x, by_u = block_diag(*[q] * steps, q_final), block_diag(*[r] * steps)
 
     def differences(x: np.ndarray, u: np.ndarray) -> float:
@@ -218,9 +218,9 @@ def test_tracking_a_motion_of_the_system_costs_nothing() -> None:
     u_ref, x_ref = rng.normal(size=(10, 1)), np.zeros((11, 3))
     for t in range(10):
         x_ref[t + 1] = a @ x_ref[t] + b @ u_ref[t]
-    p = tracking(10, (a, b, None), (np.eye(3), np.eye(1), np.eye(3)), x_ref, u_ref)
+    p = tracking_problem(10, (a, b, None), (np.eye(3), np.eye(1), np.eye(3)), x_ref, u_ref)
     policy = solve(p)
-    x, u = p.follow(policy, x_ref[0])
+    x, u = p.rollout(policy, x_ref[0])
     np.testing.assert_allclose(x, x_ref, atol=1e-10)
     np.testing.assert_allclose(u, u_ref, atol=1e-10)
     assert policy.value(x_ref[0]) == pytest.approx(0.0, abs=1e-9 * np.sum(x_ref**2))
@@ -239,13 +239,13 @@ def problems(draw: st.DrawFn) -> LqrProblem:
         draw(arrays(float, (n, m), elements=numbers)),
     )
     assume(np.abs(b).max() > 0.05)
-    assume(_grip(a, b) > 1e-2)
+    assume(_stabilizability_margin(a, b) > 1e-2)
     size = st.floats(-2.0, 2.0)
     q, r, q_final = (np.diag(10.0 ** np.array([draw(size) for _ in range(k)])) for k in (n, m, n))
     return LqrProblem(draw(st.integers(1, 30)), a, b, q, r, q_final)
 
 
-def _grip(a: np.ndarray, b: np.ndarray) -> float:
+def _stabilizability_margin(a: np.ndarray, b: np.ndarray) -> float:
     """How far (A, B) is from a system with a mode that neither decays nor listens."""
     outside = [e for e in np.linalg.eigvals(a) if abs(e) > 0.95]
     eye = np.eye(len(a))
@@ -260,7 +260,7 @@ def test_value_and_perturbed_gains(p: LqrProblem, seed: int) -> None:
     rng = np.random.default_rng(seed)
     x0 = rng.normal(size=p.n)
     policy = solve(p)
-    cost = p.cost(*p.follow(policy, x0))
+    cost = p.cost(*p.rollout(policy, x0))
     assert cost == pytest.approx(policy.value(x0), rel=1e-8)
     assert (policy.values == policy.values.transpose(0, 2, 1)).all()
     size = np.abs(policy.values).max(axis=(1, 2))
@@ -270,10 +270,10 @@ def test_value_and_perturbed_gains(p: LqrProblem, seed: int) -> None:
     change = rng.normal(size=gains[t].shape)
     gains[t] += change
     other = LqrPolicy(gains, policy.values, policy.offsets, policy.linear, policy.constants)
-    x, _ = p.follow(policy, x0)
+    x, _ = p.rollout(policy, x0)
     du = change @ x[t]
     h = p.r + p.b.T @ policy.values[t + 1] @ p.b
-    dearer = p.cost(*p.follow(other, x0)) - cost
+    dearer = p.cost(*p.rollout(other, x0)) - cost
     assert dearer == pytest.approx(du @ h @ du, rel=1e-6, abs=1e-8 * cost)
     assert dearer >= -1e-12 * cost
 
@@ -284,14 +284,14 @@ def test_the_steady_state_stabilises(p: LqrProblem) -> None:
     found = steady_state(p.a, p.b, p.q, p.r)
     assert not found.trouble
     assert np.abs(np.linalg.eigvals(p.a + p.b @ found.gain)).max() < 1.0
-    directly = steady_state_directly(p.a, p.b, p.q, p.r)
+    directly = steady_state_by_scipy(p.a, p.b, p.q, p.r)
     size = np.abs(directly.value).max()
     np.testing.assert_allclose(found.value, directly.value, atol=1e-7 * size)
 
 
 # What cannot be -------------------------------------------------------------------------------
 
-GOOD: dict[str, Any] = {
+WELL_CONDITIONED: dict[str, Any] = {
     "horizon": 3,
     "a": np.eye(2),
     "b": np.ones((2, 1)),
@@ -320,15 +320,15 @@ GOOD: dict[str, Any] = {
     ],
 )
 def test_a_problem_that_is_none_says_why(changes: dict[str, Any], sentence: str) -> None:
-    LqrProblem(**GOOD)
+    LqrProblem(**WELL_CONDITIONED)
     with pytest.raises(LabError, match=sentence):
-        LqrProblem(**{**GOOD, **changes})
+        LqrProblem(**{**WELL_CONDITIONED, **changes})
 
 
 def test_a_mode_out_of_reach_is_named() -> None:
     a, b = np.diag([0.5, 1.2]), np.array([[1.0], [0.0]])
-    assert hidden_modes(a, b) == pytest.approx([1.2])
-    for find in (steady_state, steady_state_directly):
+    assert unstabilizable_modes(a, b) == pytest.approx([1.2])
+    for find in (steady_state, steady_state_by_scipy):
         with pytest.raises(LabError, match=r"not stabilizable: .* eigenvalue 1\.2"):
             find(a, b, np.eye(2), ONE)
     with pytest.raises(LabError, match="P grows beyond all numbers"):
@@ -337,14 +337,14 @@ def test_a_mode_out_of_reach_is_named() -> None:
 
 def test_a_stable_mode_out_of_reach_is_none_of_our_business() -> None:
     a, b = np.diag([0.5, 1.2]), np.array([[0.0], [1.0]])
-    assert len(hidden_modes(a, b)) == 0
+    assert len(unstabilizable_modes(a, b)) == 0
     assert not steady_state(a, b, np.eye(2), ONE).trouble
 
 
 def test_an_unstable_mode_must_cost_something() -> None:
     """Position that costs nothing drifts: no steady state brings it back."""
     a, b = np.array([[1.0, 0.1], [0.0, 1.0]]), np.array([[0.005], [0.1]])
-    for find in (steady_state, steady_state_directly):
+    for find in (steady_state, steady_state_by_scipy):
         with pytest.raises(LabError, match="Q does not see the mode with eigenvalue 1,"):
             find(a, b, np.diag([0.0, 1.0]), ONE)
         assert find(a, b, np.diag([1.0, 0.0]), ONE).residual < 1e-10
@@ -358,6 +358,6 @@ def test_too_few_steps_of_the_recursion_are_told() -> None:
 
 def test_the_least_squares_problem_knows_its_bounds() -> None:
     with pytest.raises(LabError, match="takes A, B, Q, R and Q_f alone"):
-        solve_at_once(general(0), np.zeros(3))
+        solve_least_squares(general(0), np.zeros(3))
     with pytest.raises(LabError, match="N = 2000 makes a matrix of 12000 by 4000 entries"):
-        solve_at_once(stationary(0, horizon=2000), np.zeros(4))
+        solve_least_squares(stationary(0, horizon=2000), np.zeros(4))

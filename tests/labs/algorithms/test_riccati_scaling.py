@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labs.algorithms.least_squares_lqr import solve_at_once
-from labs.algorithms.periodic_lqr import periodic
-from labs.algorithms.riccati import solve, steady_state, steady_state_directly
-from labs.algorithms.stabilizability import hidden_modes, require_detectable
+from labs.algorithms.least_squares_lqr import solve_least_squares
+from labs.algorithms.periodic_lqr import solve_periodic
+from labs.algorithms.riccati import solve, steady_state, steady_state_by_scipy
+from labs.algorithms.stabilizability import require_detectable, unstabilizable_modes
 from labs.errors import LabError
 from labs.problems.linear_quadratic import LqrProblem, weight_roots
 
@@ -44,7 +44,7 @@ def test_it_is_waited_for_along_no_axis_either() -> None:
 def test_a_solution_of_scipys_that_is_none_is_told() -> None:
     a = np.diag(20.0 * np.linspace(1.0, 1.5, 4)) + np.diag(np.ones(3), 1)
     b = np.eye(4)[:, 3:]
-    found = steady_state_directly(a, b, np.eye(4), ONE)
+    found = steady_state_by_scipy(a, b, np.eye(4), ONE)
     assert found.radius == pytest.approx(np.abs(np.linalg.eigvals(a + b @ found.gain)).max())
     assert found.residual > 0.1 or found.radius > 1.0, "else it is a solution by now"
     assert found.trouble.startswith("SciPy's P does not solve the Riccati equation")
@@ -64,7 +64,7 @@ def test_the_units_of_the_coordinates_do_not_matter() -> None:
 
 def test_a_controllable_chain_is_so_in_any_units() -> None:
     a, b = np.array([[1.2, 1e-4, 0.0], [0.0, 0.5, 1e4], [0.0, 0.0, 0.5]]), np.eye(3)[:, 2:]
-    assert len(hidden_modes(a, b)) == 0
+    assert len(unstabilizable_modes(a, b)) == 0
     require_detectable(a.T, np.diag([0.0, 0.0, 1.0]))
     found = steady_state(a, b, np.eye(3), ONE)
     assert not found.trouble
@@ -84,12 +84,12 @@ def test_what_is_out_of_reach_is_so_in_any_units(seed: int) -> None:
     turn = np.linalg.qr(rng.normal(size=(n, n)))[0] if seed % 2 else np.eye(n)
     d = 10.0 ** rng.uniform(-4, 4, n)
     a, b = (turn @ a @ turn.T) * d[:, None] / d, d[:, None] * (turn @ b)
-    hidden = hidden_modes(a, b)
+    hidden = unstabilizable_modes(a, b)
     wanted = 1.3 / np.abs(alone).max() * alone
     wanted = wanted[np.abs(wanted) >= 1.0]
     assert len(hidden) == len(wanted)
     np.testing.assert_allclose(np.sort(np.abs(hidden)), np.sort(np.abs(wanted)), rtol=1e-6)
-    assert len(hidden_modes(a, np.hstack([b, np.diag(d)]))) == 0
+    assert len(unstabilizable_modes(a, np.hstack([b, np.diag(d)]))) == 0
 
 
 def test_the_roots_of_a_weight_are_accurate_row_by_row() -> None:
@@ -113,21 +113,21 @@ def test_least_squares_sees_small_weights() -> None:
     root = rng.normal(size=(3, 3))
     q = root @ root.T
     q = 0.5 * (q + q.T)
-    wanted = solve_at_once(LqrProblem(10, a, b, q, TWO, q), x0)
+    wanted = solve_least_squares(LqrProblem(10, a, b, q, TWO, q), x0)
     d = np.array([1e-9, 1.0, 1e4])
     scaled_q = q / d / d[:, None]
     scaled = LqrProblem(10, a * d[:, None] / d, d[:, None] * b, scaled_q, TWO, scaled_q)
-    np.testing.assert_allclose(solve_at_once(scaled, d * x0), wanted, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(solve_least_squares(scaled, d * x0), wanted, rtol=1e-9, atol=1e-12)
     by_riccati = solve(scaled)
-    np.testing.assert_allclose(scaled.follow(by_riccati, d * x0)[1], wanted, rtol=1e-8, atol=1e-11)
+    np.testing.assert_allclose(scaled.rollout(by_riccati, d * x0)[1], wanted, rtol=1e-8, atol=1e-11)
 
 
 def test_a_lap_settles_when_its_smallest_value_does() -> None:
     """A mode that grows by 10 % a lap and costs next to nothing, beside a large one at rest."""
     a, q = np.diag([1.1, 0.5]), np.diag([1e-13, 1.0])
     lap = LqrProblem(1, a, TWO, q, TWO, q)
-    found = periodic(lap)
+    found = solve_periodic(lap)
     assert found.policy.values[0, 0, 0] == pytest.approx(scalar(1.1, 1e-13), rel=1e-6)
     assert found.radius < 1.0
     with pytest.raises(LabError, match=r"what it regulates grows by a factor of 1\.1 a lap"):
-        periodic(replace(lap, q=np.diag([0.0, 1.0])))
+        solve_periodic(replace(lap, q=np.diag([0.0, 1.0])))

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from labs.algorithms import riccati
-from labs.algorithms.shooting_steps import FORMS, SHOOTING_METHODS, CostForm
+from labs.algorithms.shooting_steps import COST_FORMS, SHOOTING_METHODS, CostForm
 from labs.algorithms.single_shooting import SingleShooting
 from labs.errors import LabError
 from labs.models.mechanisms import mechanism
@@ -41,7 +41,7 @@ def constrained(rng: np.random.Generator, name: str) -> SingleShooting:
     return SingleShooting(nonlinear(rng, name, T_limits=(0.1, 3.0), **given), N=4, M=2)
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", COST_FORMS)
 @pytest.mark.parametrize("method", SHOOTING_METHODS)
 def test_sensitivities_and_gradients_by_finite_differences(method: str, form: CostForm) -> None:
     rng = np.random.default_rng(1)
@@ -89,7 +89,7 @@ def test_constraints_and_exact_hessian_by_finite_differences(name: str) -> None:
     assert np.linalg.eigvalsh(gauss_newton).min() > -1e-9
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", COST_FORMS)
 def test_the_hessians_meet_where_the_model_is_linear(form: CostForm) -> None:
     cost = Quadratic(np.diag([1.0, 0.2]), np.array([[0.3]]), np.eye(2), np.array([1.0, 0.0]))
     p = problem(DoubleIntegrator(), cost, np.array([0.5, -1.0]), 2.0)
@@ -102,7 +102,7 @@ def test_the_hessians_meet_where_the_model_is_linear(form: CostForm) -> None:
     np.testing.assert_allclose(gauss_newton, exact, rtol=1e-8, atol=1e-8)
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", COST_FORMS)
 @pytest.mark.parametrize("method", SHOOTING_METHODS)
 def test_one_newton_step_is_riccati(method: str, form: CostForm) -> None:
     rng = np.random.default_rng(4)

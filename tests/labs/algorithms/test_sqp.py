@@ -10,13 +10,13 @@ from scipy.sparse import csc_array
 
 from labs.algorithms import sqp
 from labs.algorithms.sqp import SqpOptions
-from labs.algorithms.sqp_bfgs import LARGEST_GROUP, first
+from labs.algorithms.sqp_bfgs import LARGEST_GROUP, initial_hessian
 from labs.algorithms.sqp_convexity import convexify, is_positive_definite
 from labs.algorithms.sqp_qp_solver import QpSolver
 from labs.algorithms.sqp_subproblem import (
+    QpFailure,
     Subproblem,
     SubproblemSolution,
-    Unsolved,
     least_violation,
     solve_subproblem,
 )
@@ -192,7 +192,7 @@ def test_wrong_use_is_said() -> None:
     with pytest.raises(LabError, match="tolerance = 0"):
         SqpOptions(tolerance=0.0)
     with pytest.raises(LabError, match=f"{LARGEST_GROUP} are the most: choose Gauss-Newton"):
-        first(csc_array(np.ones((LARGEST_GROUP + 1, LARGEST_GROUP + 1))))
+        initial_hessian(csc_array(np.ones((LARGEST_GROUP + 1, LARGEST_GROUP + 1))))
 
 
 # Parts ----------------------------------------------------------------------------------------
@@ -256,7 +256,7 @@ def test_a_quadratic_programme_without_a_point_is_known_as_such() -> None:
         csc_array(np.eye(2)), np.zeros(2), A, np.array([5.0]), G, np.zeros(0), -box, box
     )
     answer = solve_subproblem(qp, QpSolver())
-    assert isinstance(answer, Unsolved)
+    assert isinstance(answer, QpFailure)
     assert answer.infeasible
     assert least_violation(qp, np.full(2, 9.0), QpSolver()) == pytest.approx(3.0, abs=1e-6)
 
@@ -265,13 +265,13 @@ def test_what_the_solver_cannot_read_is_not_trusted() -> None:
     none, G = np.full(2, np.inf), csc_array((0, 2))
     P = csc_array(np.full((2, 2), np.nan))
     qp = Subproblem(P, np.zeros(2), G, np.zeros(0), G, np.zeros(0), -none, none)
-    assert isinstance(solve_subproblem(qp, QpSolver()), Unsolved)
+    assert isinstance(solve_subproblem(qp, QpSolver()), QpFailure)
 
 
 def test_a_restart_keeps_multipliers_that_fit() -> None:
     at = sqp.solve(circle(1.0), np.zeros(2))
-    warm = sqp.restart(circle(1.2), at, SqpOptions())
+    warm = sqp.warm_start(circle(1.2), at, SqpOptions())
     np.testing.assert_array_equal(warm.lam, at.lam)
     assert sqp.solve(circle(1.2), warm.y).converged
-    other = sqp.restart(PUBLISHED["7"].program, replace(at, lam=np.zeros(4)), SqpOptions())
+    other = sqp.warm_start(PUBLISHED["7"].program, replace(at, lam=np.zeros(4)), SqpOptions())
     assert len(other.lam) == 1

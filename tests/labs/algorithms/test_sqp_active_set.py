@@ -7,10 +7,10 @@ from scipy.sparse import csc_array
 from labs.algorithms import sqp, sqp_active_set, sqp_subproblem
 from labs.algorithms.collocation import Collocation
 from labs.algorithms.sqp import SqpOptions
-from labs.algorithms.sqp_active_set import ActiveSet, active_set, solve_active
+from labs.algorithms.sqp_active_set import ActiveSet, identify_active_set, solve_active
 from labs.algorithms.sqp_qp_solver import QpSolution, QpSolver, QuadraticProgram
 from labs.tasks.motion.continuous import MotionLimits, continuous_motion
-from tests.labs.algorithms.transcriptions import straight
+from tests.labs.algorithms.transcriptions import straight_guess
 
 TOLERANCE = 1e-11
 STAGES, WIDE = 30, 3
@@ -70,7 +70,7 @@ def is_optimal(qp: QuadraticProgram, found: QpSolution) -> None:
 def test_the_right_active_set_leads_to_the_solution(seed: int) -> None:
     qp = staged(np.random.default_rng(seed))
     by_ip = interior(qp)
-    right = active_set(qp, by_ip)
+    right = identify_active_set(qp, by_ip)
     assert right.bounds.any()
     assert right.inequalities.any()
     found = solve_active(qp, right, TOLERANCE)
@@ -87,7 +87,7 @@ def test_one_that_is_nearly_right_often_leads_there_and_never_elsewhere() -> Non
     arrived = 0
     for seed in range(10):
         qp = staged(np.random.default_rng(seed))
-        right = active_set(qp, interior(qp))
+        right = identify_active_set(qp, interior(qp))
         for at in range(1, STAGES * WIDE, 8):  # not the fixed one
             found = solve_active(qp, changed(right, at), TOLERANCE)
             if found:
@@ -114,9 +114,9 @@ def test_what_was_not_nearly_known_is_left_to_the_solver() -> None:
     n = len(qp.q)
     wrong = ActiveSet(np.where(np.isfinite(qp.upper), 1.0, -1.0), np.ones(STAGES, bool))
     assert solve_active(qp, wrong, TOLERANCE) is None  # more is held than there is room for
-    many = sqp_active_set.MANY
+    many = sqp_active_set.MAX_CHANGES
     crowded = qp._replace(q=100.0 * qp.q)
-    active = active_set(crowded, interior(crowded))
+    active = identify_active_set(crowded, interior(crowded))
     assert np.count_nonzero(active.bounds) > many
     assert solve_active(crowded, ActiveSet(np.zeros(n), np.zeros(STAGES, bool)), TOLERANCE) is None
 
@@ -135,11 +135,11 @@ def test_an_active_set_that_settled_is_not_sought_again(monkeypatch: pytest.Monk
     """Once it stays the same the solution comes by linear systems, to the same optimum."""
     N = 40
     problem = continuous_motion("pendulum", "weighted", 2.0, limits=MotionLimits(control=0.6))
-    program, guess = Collocation(problem, N, "trapezoidal"), straight(problem, N)
+    program, guess = Collocation(problem, N, "trapezoidal"), straight_guess(problem, N)
     y, options = program.variables(guess.X, guess.U), SqpOptions("gauss-newton")
     at = sqp.solve(program, y, options)
     assert at.converged
-    assert at.settled
+    assert at.active_set_settled
     assert at.active
     np.testing.assert_array_equal(at.active.bounds != 0.0, at.nu != 0.0)
     with monkeypatch.context() as patched:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labs.algorithms.exploration import CONFIDENCE, FOLLOW, BehaviourPolicy, choose
+from labs.algorithms.exploration import CONFIDENCE_BOUND, FIXED_POLICY, BehaviourPolicy, choose
 from labs.algorithms.td_control import (
     Q_LEARNING,
     SARSA,
@@ -19,7 +19,7 @@ from labs.errors import LabError
 from labs.problems.episodes import EpisodicTask, UpdateRule, episodic_task
 from labs.problems.finite_mdp import FiniteMDP
 from labs.tasks.grid_world.map import MAPS, GridWorld
-from tests.labs.algorithms.learning_tasks import fresh, grid, same
+from tests.labs.algorithms.learning_tasks import grid, initial_learners, same
 
 EVERY_METHOD = [Q_LEARNING, SARSA, SARSA_N, SARSA_LAMBDA]
 every_method = pytest.mark.parametrize("method", EVERY_METHOD)
@@ -28,13 +28,13 @@ every_method = pytest.mark.parametrize("method", EVERY_METHOD)
 # One episode whose controls are known beforehand, against plain Python --------------------------
 
 
-def scripted() -> tuple[EpisodicTask, BehaviourPolicy, list[tuple[int, int, float]]]:
+def scripted_policy() -> tuple[EpisodicTask, BehaviourPolicy, list[tuple[int, int, float]]]:
     """Round a ring of three states, cut after seven steps: pairs come again. What happens is
     known: (x, u, l) of each step."""
     successor = np.array([[1, 2], [2, 0], [0, 3], [3, 3]], np.int32)
     cost = np.array([[1.0, 4.0], [2.0, 5.0], [3.0, 7.0], [0.0, 0.0]])
     mdp = FiniteMDP(cost, 0.9, np.array([0, 0, 0, 1], bool), successor=successor)
-    behaviour = BehaviourPolicy(FOLLOW, epsilon=0.0, policy=np.array([0, 0, 0, 0]))
+    behaviour = BehaviourPolicy(FIXED_POLICY, epsilon=0.0, policy=np.array([0, 0, 0, 0]))
     visited = [(x, 0, cost[x, 0]) for x in (0, 1, 2, 0, 1, 2, 0)]
     return episodic_task(mdp, [0], 7), behaviour, visited
 
@@ -44,17 +44,17 @@ def ending() -> tuple[EpisodicTask, BehaviourPolicy, list[tuple[int, int, float]
     successor = np.array([[1, 2], [1, 2], [3, 3], [3, 3]], np.int32)
     cost = np.array([[1.0, 4.0], [2.0, 5.0], [3.0, 7.0], [0.0, 0.0]])
     mdp = FiniteMDP(cost, 0.9, np.array([0, 0, 0, 1], bool), successor=successor)
-    behaviour = BehaviourPolicy(FOLLOW, epsilon=0.0, policy=np.array([1, 0, 1, 0]))
+    behaviour = BehaviourPolicy(FIXED_POLICY, epsilon=0.0, policy=np.array([1, 0, 1, 0]))
     return episodic_task(mdp, [0], 50), behaviour, [(0, 1, 4.0), (2, 1, 7.0)]
 
 
 def begun(experience: EpisodicTask) -> Learners:
     """Learners with some opinion already."""
-    learners = fresh(experience)
+    learners = initial_learners(experience)
     return replace(learners, q=np.random.default_rng(3).uniform(0.0, 5.0, learners.q.shape))
 
 
-@pytest.mark.parametrize("episode", [scripted, ending])
+@pytest.mark.parametrize("episode", [scripted_policy, ending])
 def test_q_learning_does_what_it_says(episode: object) -> None:
     experience, behaviour, visited = episode()  # type: ignore[operator]
     before = begun(experience)
@@ -73,7 +73,7 @@ def test_q_learning_does_what_it_says(episode: object) -> None:
     )
 
 
-@pytest.mark.parametrize("episode", [scripted, ending])
+@pytest.mark.parametrize("episode", [scripted_policy, ending])
 @pytest.mark.parametrize("n", [1, 2, 3, 20])
 def test_sarsa_n_does_what_it_says(episode: object, n: int) -> None:
     """The textbook order: the pair of n steps ago is updated as soon as its costs are there."""
@@ -96,7 +96,7 @@ def test_sarsa_n_does_what_it_says(episode: object, n: int) -> None:
         np.testing.assert_allclose(same_by_sarsa.q[0], q, rtol=1e-13)
 
 
-@pytest.mark.parametrize("episode", [scripted, ending])
+@pytest.mark.parametrize("episode", [scripted_policy, ending])
 @pytest.mark.parametrize("decay", [0.0, 0.4, 1.0])
 def test_offline_sarsa_lambda_moves_to_the_lambda_return(episode: object, decay: float) -> None:
     """Backward view against forward view: n-step returns weighed by (1 - lambda) lambda^(n-1),
@@ -134,7 +134,7 @@ def test_offline_lambda_one_is_every_visit_monte_carlo() -> None:
     """On the windy grid, from an episode that revisits many pairs to its end at the goal: each
     visit moves its pair by alpha (J_t - Q)."""
     world, experience = grid("windy", horizon=100_000)
-    before = fresh(experience, seed=5)
+    before = initial_learners(experience, seed=5)
     behaviour = BehaviourPolicy(epsilon=1.0)
     rule = UpdateRule(0.001, trace_decay=1.0, offline=True)
     after = step(experience, behaviour, rule, SARSA_LAMBDA, before, 1)
@@ -163,7 +163,7 @@ def chosen(behaviour: BehaviourPolicy, x: int, experience: EpisodicTask, random:
 
 
 @pytest.mark.parametrize(
-    "explorer", [BehaviourPolicy(), BehaviourPolicy(CONFIDENCE), BehaviourPolicy(decay=1.0)]
+    "explorer", [BehaviourPolicy(), BehaviourPolicy(CONFIDENCE_BOUND), BehaviourPolicy(decay=1.0)]
 )
 @pytest.mark.parametrize("omega", [0.0, 0.8])
 @pytest.mark.parametrize("slip", [0.0, 0.2])
@@ -171,7 +171,7 @@ def test_lambda_zero_and_one_step_are_sarsa_bit_for_bit(
     explorer: BehaviourPolicy, omega: float, slip: float
 ) -> None:
     _, experience = grid("cliff", slip)
-    one = other = third = fresh(experience, seeds=3)
+    one = other = third = initial_learners(experience, seeds=3)
     for _ in range(5):
         one = step(experience, explorer, UpdateRule(0.4, omega), SARSA, one, 40)
         other = step(
@@ -189,8 +189,10 @@ def test_lambda_zero_and_one_step_are_sarsa_bit_for_bit(
 def test_accumulating_traces_may_diverge_and_say_so() -> None:
     _, experience = grid("windy")
     rule = UpdateRule(1.0, trace_decay=1.0, limit=1e6)
-    learners = step(experience, BehaviourPolicy(), rule, SARSA_LAMBDA, fresh(experience), 100)
-    assert not learners.sound
+    learners = step(
+        experience, BehaviourPolicy(), rule, SARSA_LAMBDA, initial_learners(experience), 100
+    )
+    assert not learners.bounded
     assert np.isfinite(learners.q).all()
     assert np.isfinite(learners.costs).all()
     assert step(experience, BehaviourPolicy(), rule, SARSA_LAMBDA, learners, 10) is learners
@@ -199,23 +201,25 @@ def test_accumulating_traces_may_diverge_and_say_so() -> None:
         BehaviourPolicy(),
         rule._replace(replacing=True, trace_decay=0.9),
         SARSA_LAMBDA,
-        fresh(experience),
+        initial_learners(experience),
         100,
     )
-    assert kind.sound
+    assert kind.bounded
 
 
 def test_an_episode_that_starts_at_its_end_is_empty() -> None:
     mdp = GridWorld.parse(MAPS["4x4"]).mdp(1.0)
     nowhere = episodic_task(mdp, [0], 10)
     for method in EVERY_METHOD:
-        learners = step(nowhere, BehaviourPolicy(), UpdateRule(), method, fresh(nowhere), 3)
+        learners = step(
+            nowhere, BehaviourPolicy(), UpdateRule(), method, initial_learners(nowhere), 3
+        )
         assert learners.lengths.sum() == learners.visits.sum() == 0
 
 
 def test_what_does_not_fit_is_refused() -> None:
     _, experience = grid("cliff")
-    good = fresh(experience)
+    good = initial_learners(experience)
     for changed, behaviour, rule, learners, words in (
         (
             experience,
@@ -233,12 +237,12 @@ def test_what_does_not_fit_is_refused() -> None:
         ),
         (
             experience,
-            BehaviourPolicy(FOLLOW, policy=np.zeros(2, int)),
+            BehaviourPolicy(FIXED_POLICY, policy=np.zeros(2, int)),
             UpdateRule(),
             good,
             "policy of 2",
         ),
-        (experience, BehaviourPolicy(FOLLOW), UpdateRule(), good, "policy of 0"),
+        (experience, BehaviourPolicy(FIXED_POLICY), UpdateRule(), good, "policy of 0"),
         (experience, BehaviourPolicy(epsilon=1.5), UpdateRule(), good, "epsilon = 1.5"),
         (experience, BehaviourPolicy(), UpdateRule(alpha=-0.1), good, "alpha = -0.1"),
         (experience, BehaviourPolicy(), UpdateRule(n=0), good, "n = 0"),

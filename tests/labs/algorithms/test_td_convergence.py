@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labs.algorithms.exploration import FOLLOW, BehaviourPolicy
+from labs.algorithms.exploration import FIXED_POLICY, BehaviourPolicy
 from labs.algorithms.td_control import (
     Q_LEARNING,
     SARSA,
@@ -14,7 +14,7 @@ from labs.algorithms.td_control import (
 )
 from labs.problems.episodes import UpdateRule, episodic_task
 from labs.tasks.grid_world.map import MAPS, GridWorld
-from tests.labs.algorithms.learning_tasks import fresh, grid, optimum, random_mdp, same
+from tests.labs.algorithms.learning_tasks import grid, initial_learners, optimum, random_mdp, same
 
 EVERY_METHOD = [Q_LEARNING, SARSA, SARSA_N, SARSA_LAMBDA]
 every_method = pytest.mark.parametrize("method", EVERY_METHOD)
@@ -27,7 +27,7 @@ def test_learning_can_be_interrupted_anywhere(method: int) -> None:
         UpdateRule(0.3, 0.6, n=3, trace_decay=0.6),
         BehaviourPolicy(epsilon=0.3, decay=0.5),
     )
-    start = fresh(experience, seeds=2)
+    start = initial_learners(experience, seeds=2)
     before = start.q.copy()
     whole = step(experience, behaviour, rule, method, start, 30)
     half = step(experience, behaviour, rule, method, start, 17)
@@ -48,7 +48,7 @@ def test_with_step_one_q_learning_finds_the_exact_optimum_of_a_deterministic_wor
         BehaviourPolicy(epsilon=0.5),
         UpdateRule(1.0),
         Q_LEARNING,
-        fresh(everywhere, 3),
+        initial_learners(everywhere, 3),
         5000,
     )
     assert learners.visits[:, ~mdp.terminal].min() > 0
@@ -67,7 +67,7 @@ def test_q_learning_converges_in_a_random_world() -> None:
         BehaviourPolicy(epsilon=0.5),
         UpdateRule(1.0, 0.7),
         Q_LEARNING,
-        fresh(everywhere, 4),
+        initial_learners(everywhere, 4),
         30_000,
     )
     assert np.abs(learners.q - q_star).max() < 0.01 * np.ptp(q_star)
@@ -80,7 +80,7 @@ def test_sarsa_converges_if_it_explores_less_and_less(method: int, decay: float)
     mdp = random_mdp(6, 2, 0.7, seed=1)
     q_star = optimum(mdp)
     everywhere = episodic_task(mdp, range(6), 100)
-    rule, untrained = UpdateRule(1.0, 0.8, trace_decay=decay), fresh(everywhere, 4)
+    rule, untrained = UpdateRule(1.0, 0.8, trace_decay=decay), initial_learners(everywhere, 4)
     glie = step(
         everywhere, BehaviourPolicy(epsilon=1.0, decay=0.5), rule, method, untrained, 30_000
     )
@@ -99,8 +99,8 @@ def test_sarsa_that_follows_a_controller_learns_its_value() -> None:
     V = np.linalg.solve(np.eye(6) - 0.7 * mdp.transition_matrix(weights), mdp.policy_cost(weights))
     q_mu = mdp.C + 0.7 * np.einsum("uxy,y->xu", mdp.probabilities, V)
     everywhere = episodic_task(mdp, range(6), 100)
-    behaviour = BehaviourPolicy(FOLLOW, epsilon=epsilon, policy=mu)
-    untrained, rule = fresh(everywhere, 4), UpdateRule(1.0, 0.7)
+    behaviour = BehaviourPolicy(FIXED_POLICY, epsilon=epsilon, policy=mu)
+    untrained, rule = initial_learners(everywhere, 4), UpdateRule(1.0, 0.7)
     by_sarsa = step(everywhere, behaviour, rule, SARSA, untrained, 30_000).q
     by_q_learning = step(everywhere, behaviour, rule, Q_LEARNING, untrained, 30_000).q
     np.testing.assert_allclose(by_sarsa, np.broadcast_to(q_mu, by_sarsa.shape), atol=0.02)
@@ -113,7 +113,7 @@ def test_the_cliff_parts_on_policy_from_off_policy() -> None:
     """Forty learners of each kind, epsilon = 0.1 for good: Q-learning's greedy walk is the optimal
     one of 13 along the edge; SARSA keeps off it. While learning, SARSA pays less."""
     _, experience = grid("cliff")
-    behaviour, untrained = BehaviourPolicy(epsilon=0.1), fresh(experience, 40)
+    behaviour, untrained = BehaviourPolicy(epsilon=0.1), initial_learners(experience, 40)
     off = step(experience, behaviour, UpdateRule(0.5), Q_LEARNING, untrained, 1000)
     on = step(experience, behaviour, UpdateRule(0.5), SARSA, untrained, 1000)
     assert (greedy_costs(experience, off) == 13.0).all()
@@ -137,7 +137,7 @@ def test_the_windy_grid_takes_fifteen_steps() -> None:
             BehaviourPolicy(epsilon=0.1, decay=0.5),
             UpdateRule(0.5),
             method,
-            fresh(experience, 10),
+            initial_learners(experience, 10),
             3000,
         )
         assert (greedy_costs(experience, learners) == 15.0).sum() >= (10 if method == 0 else 8)

@@ -9,10 +9,10 @@ from qpsolvers import solve_qp
 
 from labs.algorithms import mpc
 from labs.algorithms.linear_mpc import LinearPlanner
-from labs.algorithms.polygons import from_vertices, vertices
+from labs.algorithms.polygons import polyhedron_from_vertices, vertices
 from labs.algorithms.riccati import steady_state
 from labs.algorithms.robust_invariant_set import RobustInvariantSet, robust_invariant_set
-from labs.algorithms.tube_mpc import TubePlanner, tightened
+from labs.algorithms.tube_mpc import TubePlanner, tighten_problem
 from labs.problems.linear_mpc import LinearMpcProblem
 from labs.problems.polyhedron import Polyhedron, box
 from labs.resumable import run_to_completion
@@ -40,12 +40,12 @@ def published(w: float = 0.1) -> Example:
     X, U = box([-inf, -inf], [inf, 2.0]), box([-1.0], [1.0])
     problem = LinearMpcProblem(9, A, B, Q, R, lqr.value, X, U)
     S = robust_invariant_set(A + B @ K, box([-w, -w], [w, w]), error=1e-3)
-    nominal = tightened(problem, S, K)
+    nominal = tighten_problem(problem, S, K)
     powers = [np.linalg.matrix_power(A + B @ K, k) for k in range(10)]
     rows = [(nominal.state_set.H @ M, nominal.state_set.h) for M in powers]
     rows += [(nominal.control_set.H @ K @ M, nominal.control_set.h) for M in powers]
     H, h = zip(*rows, strict=True)
-    X_f = from_vertices(vertices(Polyhedron(np.vstack(H), np.concatenate(h))))
+    X_f = polyhedron_from_vertices(vertices(Polyhedron(np.vstack(H), np.concatenate(h))))
     nominal = replace(nominal, terminal_set=X_f)
     return Example(problem, K, S, TubePlanner(nominal, S.polyhedron(), K))
 
@@ -165,7 +165,7 @@ def test_what_is_infeasible_says_why() -> None:
     assert far.message.startswith("Infeasible")
     large = published()
     S = robust_invariant_set(large.S.A, box([-0.6, -0.6], [0.6, 0.6]), error=1e-3)
-    planner = TubePlanner(tightened(large.problem, S, large.K), S.polyhedron(), large.K)
+    planner = TubePlanner(tighten_problem(large.problem, S, large.K), S.polyhedron(), large.K)
     nothing = run_to_completion(planner.plan(np.zeros(2), None))
     assert not nothing.found
     assert "nothing is left of U" in nothing.message

@@ -25,7 +25,7 @@ def problem(*rows: tuple[tuple[float, tuple[float, float, float]], ...]) -> Fini
 
 def best(mdp: FiniteMDP) -> np.ndarray:
     V, policy, _ = optimum(mdp, random_policy(mdp))
-    np.testing.assert_array_equal(policy_evaluation.exact(mdp, policy), V)
+    np.testing.assert_array_equal(policy_evaluation.exact_values(mdp, policy), V)
     return V
 
 
@@ -65,6 +65,6 @@ def test_frozen_lakes_chance_to_arrive(name: str) -> None:
     outcomes = np.argsort(-P, axis=2, kind="stable")[..., :3].astype(np.int32)
     few = np.take_along_axis(P, outcomes, axis=2)
     sparse = FiniteMDP(-reward, 1.0, terminal, P=few, outcomes=outcomes)
-    np.testing.assert_allclose(policy_evaluation.exact(sparse, policy), V, atol=1e-12)
+    np.testing.assert_allclose(policy_evaluation.exact_values(sparse, policy), V, atol=1e-12)
     np.testing.assert_allclose(optimum(sparse, random_policy(sparse))[0], V, atol=1e-12)
     np.testing.assert_allclose(sparse.transition_matrix(policy), dense.transition_matrix(policy))

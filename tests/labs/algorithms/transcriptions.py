@@ -55,7 +55,7 @@ class Guess:
     U: np.ndarray
 
 
-def straight(problem: ContinuousProblem, N: int) -> Guess:
+def straight_guess(problem: ContinuousProblem, N: int) -> Guess:
     """A straight line to what the cost refers to, or of a reach a rest, its control what holds
     the start."""
     assert isinstance(problem.cost, ContinuousMotionCost)

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from labs.engine import catalog as catalog_module
-from labs.engine.catalog import CHAPTERS, catalog, find
+from labs.engine.catalog import CHAPTERS, catalog, find_lab
 from labs.errors import LabError, UnknownLab
 
 LAB = '''
@@ -54,7 +54,7 @@ def course(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Course]:
 
 
 def test_the_shipped_labs_are_found_with_their_articles() -> None:
-    entry = find("joint-control")
+    entry = find_lab("joint-control")
     assert (entry.chapter, entry.chapter_title) == ("1", "Reactive control")
     assert entry.lab.title == "Joint motion control"
     assert "$$" in entry.article
@@ -69,7 +69,7 @@ def test_labs_stand_in_the_order_of_the_course() -> None:
 
 def test_a_lab_of_ones_own_is_found(course: Course) -> None:
     course("own_course", my_first_lab="C.1")
-    entry = find("my-first-lab")
+    entry = find_lab("my-first-lab")
     assert (entry.chapter, entry.lab.section) == ("C", "C.1")
     assert entry.article == "About my_first_lab."
     assert entry.picture is None
@@ -124,7 +124,7 @@ def test_a_package_without_a_number_is_no_chapter(course: Course) -> None:
 
 def test_an_unknown_lab_is_refused_with_the_names_there_are() -> None:
     with pytest.raises(UnknownLab) as refused:
-        find("joint_control")
+        find_lab("joint_control")
     assert str(refused.value).startswith("no lab is named 'joint_control'; there are ")
     assert all(slug in str(refused.value) for slug in catalog())
 

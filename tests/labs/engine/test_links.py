@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.links import read_link
 from labs.params import Value
 
@@ -56,14 +56,14 @@ CASES: Mapping[str, tuple[dict[str, str], dict[str, Value], int | None, list[str
 @pytest.mark.parametrize("name", CASES)
 def test_a_link_keeps_what_it_can(name: str) -> None:
     texts, changed, seed, remarks = CASES[name]
-    defaults = find("oscillator").lab.Params()
+    defaults = find_lab("oscillator").lab.Params()
     params, found, said = read_link(defaults, texts)
     assert params.changed_from(defaults) == changed
     assert (found, said) == (seed, remarks)
 
 
 def test_a_text_that_means_nothing_takes_nothing_else_with_it() -> None:
-    defaults = find("markov").lab.Params()
+    defaults = find_lab("markov").lab.Params()
     params, _, remarks = read_link(defaults, {"gamma": "0.5", "table": "1,0\n0,2"})
     assert params.changed_from(defaults) == {"gamma": 0.5}
     assert len(remarks) == 1

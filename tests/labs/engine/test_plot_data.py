@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labs.engine.headless import run
+from labs.engine.headless import run_headless
 from labs.engine.plot_data import PlotData, _points, file_name, named_values
 from labs.engine.run import World
 from labs.errors import LabError
@@ -33,12 +33,12 @@ def column(rows: list[list[str]], k: int) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def oscillator() -> World:
-    return run("oscillator", {"noisy": True}, seconds=0.7, seed=3)
+    return run_headless("oscillator", {"noisy": True}, seconds=0.7, seed=3)
 
 
 @pytest.fixture(scope="module")
 def grid() -> World:
-    return run("dynamic-programming", {}, seconds=0.1)
+    return run_headless("dynamic-programming", {}, seconds=0.1)
 
 
 def test_time_series_are_the_recording(oscillator: World) -> None:
@@ -63,7 +63,7 @@ def test_curves_are_their_points_under_their_names(oscillator: World) -> None:
 
 
 def test_several_curves_of_one_field_have_their_words() -> None:
-    world = run("markov", {}, seconds=0.1)
+    world = run_headless("markov", {}, seconds=0.1)
     said, (header, rows) = world.lab.labels(world.params), table(world, "Transition matrix")
     assert [row[0] for row in rows] == list(said["state"])
     matrix = world.lab.fields(world.params, world.state)["P"]

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from labs.engine.events import Event
-from labs.engine.headless import run
+from labs.engine.headless import run_headless
 from labs.engine.record import Recorder, Recording, versions
 from labs.engine.run import World
 
@@ -89,7 +89,9 @@ def test_a_missing_scalar_does_not_repeat_the_row_it_overwrites() -> None:
 def recording() -> Recording:
     """Ten events, a channel that begins late, noise."""
     events = [Event(i, "set", "omega", 2.0 + 0.1 * i) for i in range(10)]
-    return run("oscillator", {"noisy": True}, seconds=1.0, seed=5, events=events).recording()
+    return run_headless(
+        "oscillator", {"noisy": True}, seconds=1.0, seed=5, events=events
+    ).recording()
 
 
 def test_json_holds_the_same_numbers(recording: Recording) -> None:
@@ -148,7 +150,7 @@ def test_every_double_survives_json_and_csv(values: list[float]) -> None:
 
 
 def test_a_recording_says_what_it_covers() -> None:
-    world = World(run("oscillator", seconds=0.0).entry, capacity=11)
+    world = World(run_headless("oscillator", seconds=0.0).entry, capacity=11)
     for _ in range(25):
         world.advance()
     recording = world.recording()

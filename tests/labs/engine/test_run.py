@@ -13,19 +13,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from labs.engine import run as run_module
-from labs.engine.catalog import find
-from labs.engine.events import Event, events_of, parse_event
-from labs.engine.headless import MAX_STEPS, run
+from labs.engine.catalog import find_lab
+from labs.engine.events import Event, events_from_recording, parse_event
+from labs.engine.headless import MAX_STEPS, run_headless
 from labs.engine.run import World
 from labs.errors import LabError, ParameterError, UnknownLab
 from server.cli import _arguments_of_options, _parser
 
 
-def a_world(**changes: object) -> World:
-    return World(find("oscillator"), changes)
+def make_world(**changes: object) -> World:
+    return World(find_lab("oscillator"), changes)
 
 
-def advanced(world: World, steps: int) -> World:
+def advanced_world(world: World, steps: int) -> World:
     for _ in range(steps):
         world.advance()
     return world
@@ -37,7 +37,7 @@ def solved(world: World) -> World:
     return world
 
 
-def same(a: World, b: World) -> bool:
+def same_recording(a: World, b: World) -> bool:
     return a.recording().rows.tobytes() == b.recording().rows.tobytes() and a.params == b.params
 
 
@@ -46,25 +46,25 @@ def run_command(line: str) -> World:
     words = shlex.split(line)
     assert words[:2] == ["orclab", "run"]
     options = _parser().parse_args(words[1:])
-    return run(**_arguments_of_options(options), seconds=options.seconds)
+    return run_headless(**_arguments_of_options(options), seconds=options.seconds)
 
 
 # The world's clock ----------------------------------------------------------------------------
 
 
 def test_time_is_counted_in_steps_and_does_not_drift() -> None:
-    world = advanced(a_world(), 12_345)
+    world = advanced_world(make_world(), 12_345)
     assert world.t == 12_345 * 0.01
 
 
 def test_the_first_row_is_the_state_at_zero() -> None:
-    rows = advanced(a_world(start=0.5), 3).recording().channels
+    rows = advanced_world(make_world(start=0.5), 3).recording().channels
     assert rows["t"].tolist() == [0.0, 0.01, 0.02, 0.03]
     assert rows["x"][0] == 0.5
 
 
 def test_a_live_change_is_seen_from_the_next_step_on_and_keeps_the_run() -> None:
-    world = advanced(a_world(), 10)
+    world = advanced_world(make_world(), 10)
     x = world.state.x
     world.change({"omega": 8.0})
     assert world.state.x == x
@@ -75,7 +75,7 @@ def test_a_live_change_is_seen_from_the_next_step_on_and_keeps_the_run() -> None
 
 
 def test_a_restart_change_begins_anew_with_all_parameters_as_they_are() -> None:
-    world = advanced(a_world(), 10)
+    world = advanced_world(make_world(), 10)
     world.change({"omega": 8.0})
     world.press("kick")
     world.change({"start": 0.5})
@@ -85,91 +85,91 @@ def test_a_restart_change_begins_anew_with_all_parameters_as_they_are() -> None:
     assert about["params"]["omega"] == 8.0
     assert about["params"]["start"] == 0.5
     assert [c["kind"] for c in about["changes"]] == ["solve"]
-    assert advanced(world, 1).state.kicks == 0, "a press does not outlive the run"
+    assert advanced_world(world, 1).state.kicks == 0, "a press does not outlive the run"
 
 
 def test_a_change_to_the_same_value_changes_nothing() -> None:
-    world = advanced(a_world(), 10)
+    world = advanced_world(make_world(), 10)
     events = list(world.events)
     world.change({"start": 1.0, "omega": 2.0})
     assert (world.runs, world.steps, world.events) == (1, 10, events)
 
 
 def test_a_refused_change_leaves_the_world_as_it_was() -> None:
-    world = advanced(a_world(), 10)
+    world = advanced_world(make_world(), 10)
     events = list(world.events)
     with pytest.raises(ParameterError):
         world.change({"omega": 8.0, "start": 5.0})
-    assert world.params.model_dump() == a_world().params.model_dump()
+    assert world.params.model_dump() == make_world().params.model_dump()
     assert (world.runs, world.steps, world.events) == (1, 10, events)
 
 
 def test_a_press_acts_in_one_step_only() -> None:
-    world = a_world()
+    world = make_world()
     world.press("kick")
     world.press("kick")
-    assert [advanced(world, 1).state.kicks for _ in range(3)] == [2, 2, 2]
+    assert [advanced_world(world, 1).state.kicks for _ in range(3)] == [2, 2, 2]
 
 
 def test_an_unknown_action_is_refused() -> None:
     with pytest.raises(ParameterError, match="no action is named 'jump'; there are kick"):
-        a_world().press("jump")
+        make_world().press("jump")
     with pytest.raises(ParameterError, match="there are none"):
-        World(find("troublesome")).press("jump")
+        World(find_lab("troublesome")).press("jump")
 
 
 def test_a_handle_pulls_until_it_is_released() -> None:
-    world = a_world()
+    world = make_world()
     world.hold("pull", (0.5, 0.0, 0.0))
-    pulled = [advanced(world, 1).state.pulled for _ in range(3)]
+    pulled = [advanced_world(world, 1).state.pulled for _ in range(3)]
     world.hold("pull", None)
-    assert [*pulled, advanced(world, 1).state.pulled] == [0.5, 0.5, 0.5, 0.0]
+    assert [*pulled, advanced_world(world, 1).state.pulled] == [0.5, 0.5, 0.5, 0.0]
 
 
 def test_a_handle_that_is_not_declared_is_refused() -> None:
     """A drag that names none would be lost without a word."""
-    world = a_world()
+    world = make_world()
     for point in ((0.4, 0.2, 0.7), None):
         with pytest.raises(ParameterError, match="no handle is named 'plul'; there are pull"):
             world.hold("plul", point)
     with pytest.raises(ParameterError, match="there are none"):
-        World(find("troublesome")).hold("pull", (0.0, 0.0, 0.0))
+        World(find_lab("troublesome")).hold("pull", (0.0, 0.0, 0.0))
     with pytest.raises(ParameterError, match=r"token, tile 1 to tile 12, bead 1 to bead 12$"):
-        World(find("markov")).hold("bead 13", (0.0, 0.0, 0.0))
+        World(find_lab("markov")).hold("bead 13", (0.0, 0.0, 0.0))
     assert [e for e in world.events if e.kind == "hold"] == []
 
 
 def test_what_is_not_held_can_be_released() -> None:
-    world = a_world()
+    world = make_world()
     world.hold("pull", None)
     assert [e for e in world.events if e.kind == "hold"] == []
 
 
 @pytest.mark.parametrize("point", [(math.nan, 0.0, 0.0), (0.0, math.inf, 0.0), (0.0, 0.0)])
 def test_a_handle_goes_to_finite_points_only(point: Any) -> None:
-    world = a_world()
+    world = make_world()
     with pytest.raises(ParameterError, match="pull was dragged to"):
         world.hold("pull", point)
-    assert advanced(world, 1).state.pulled == 0.0
+    assert advanced_world(world, 1).state.pulled == 0.0
     assert [e for e in world.events if e.kind == "hold"] == []
 
 
 def test_trouble_stops_the_clock_until_a_reset() -> None:
-    world = World(find("troublesome"), {"fault": "trouble"})
-    advanced(world, 5)
+    world = World(find_lab("troublesome"), {"fault": "trouble"})
+    advanced_world(world, 5)
     assert world.steps == 1
     assert world.trouble.startswith("It diverged")
     assert world.recording().about["trouble"] == world.trouble
     world.change({"fault": "none"})
     world.reset()
-    assert advanced(world, 5).steps == 5
+    assert advanced_world(world, 5).steps == 5
 
 
 # The solver's clock ---------------------------------------------------------------------------
 
 
 def test_a_solver_runs_to_the_end_before_time_starts() -> None:
-    world = run("oscillator", {"guess": 2.0}, seconds=0.1)
+    world = run_headless("oscillator", {"guess": 2.0}, seconds=0.1)
     assert world.recording().channels["root"][1] == pytest.approx(math.sqrt(2.0), rel=1e-12)
     assert not world.solving
     assert world.latest is not None
@@ -177,8 +177,8 @@ def test_a_solver_runs_to_the_end_before_time_starts() -> None:
 
 
 def test_a_solve_change_starts_the_solver_again() -> None:
-    world = solved(a_world(guess=9.0))
-    advanced(world, 10)
+    world = solved(make_world(guess=9.0))
+    advanced_world(world, 10)
     world.change({"guess": 16.0})
     assert world.solving
     assert world.t == 0.1
@@ -186,7 +186,7 @@ def test_a_solve_change_starts_the_solver_again() -> None:
 
 
 def test_a_headless_run_solves_again_after_a_change() -> None:
-    world = run("oscillator", seconds=1.0, events=[Event(50, "set", "guess", 16.0)])
+    world = run_headless("oscillator", seconds=1.0, events=[Event(50, "set", "guess", 16.0)])
     root = world.recording().channels["root"]
     assert root[50] == pytest.approx(3.0, rel=1e-12)
     assert root[51] == pytest.approx(4.0, rel=1e-12)
@@ -194,27 +194,27 @@ def test_a_headless_run_solves_again_after_a_change() -> None:
 
 def test_iterations_between_steps_are_events_that_reproduce_the_run() -> None:
     """As a live session does: a solver that is still at work while time runs."""
-    world = a_world(guess=50.0)
+    world = make_world(guess=50.0)
     world.iterate()
     world.iterate()
-    advanced(world, 3)
+    advanced_world(world, 3)
     world.iterate()
-    advanced(world, 3)
-    again = run("oscillator", {"guess": 50.0}, seconds=world.t, events=world.events)
+    advanced_world(world, 3)
+    again = run_headless("oscillator", {"guess": 50.0}, seconds=world.t, events=world.events)
     assert [(e.step, e.value) for e in world.events] == [(0, 2), (3, 1)]
-    assert same(again, world)
+    assert same_recording(again, world)
     assert again.solving
 
 
 def test_a_run_whose_solver_never_started_is_reproduced_too() -> None:
-    world = advanced(a_world(guess=50.0), 5)
-    again = run("oscillator", {"guess": 50.0}, seconds=world.t, events=world.events)
+    world = advanced_world(make_world(guess=50.0), 5)
+    again = run_headless("oscillator", {"guess": 50.0}, seconds=world.t, events=world.events)
     assert world.state.root == again.state.root == 0.0
-    assert same(run_command(world.command()), world)
+    assert same_recording(run_command(world.command()), world)
 
 
 def test_looking_back_shows_what_was_and_the_next_iteration_goes_on_from_the_latest() -> None:
-    world = a_world(guess=50.0)
+    world = make_world(guess=50.0)
     roots = []
     for _ in range(4):
         world.iterate()
@@ -222,13 +222,13 @@ def test_looking_back_shows_what_was_and_the_next_iteration_goes_on_from_the_lat
     world.show(2)
     assert world.state.root == roots[1]
     assert world.shown is not world.latest
-    advanced(world, 3)
+    advanced_world(world, 3)
     assert world.state.root == roots[1], "time passes, what is shown stays"
     world.iterate()
     assert world.latest is world.shown
     assert world.latest is not None
     assert world.latest.iteration == 5
-    straight = a_world(guess=50.0)
+    straight = make_world(guess=50.0)
     for _ in range(5):
         straight.iterate()
     assert world.state.root == straight.state.root
@@ -240,14 +240,14 @@ def test_looking_back_shows_what_was_and_the_next_iteration_goes_on_from_the_lat
 
 
 def test_of_looking_around_within_one_step_only_the_last_is_kept() -> None:
-    world = solved(a_world())
+    world = solved(make_world())
     for k in (5, 3, 1, 2):
         world.show(k)
     assert [(e.name, e.value) for e in world.events[1:]] == [("show", 2)]
 
 
 def test_a_solver_started_anew_forgets_what_it_found() -> None:
-    world = solved(a_world())
+    world = solved(make_world())
     solves = world.solves
     world.change({"guess": 16.0})
     assert world.solves == solves + 1
@@ -258,18 +258,21 @@ def test_a_solver_started_anew_forgets_what_it_found() -> None:
 
 
 def test_a_headless_run_looks_back_at_what_it_solved_to_the_end() -> None:
-    world = run("oscillator", seconds=1.0, events=[Event(50, "solve", "show", 2)])
+    world = run_headless("oscillator", seconds=1.0, events=[Event(50, "solve", "show", 2)])
     root = world.recording().channels["root"]
     assert root[50] == pytest.approx(3.0, rel=1e-12)
     assert root[51] == 3.4
-    assert run("oscillator", seconds=0.0, events=[Event(0, "solve", "show", 1)]).state.root == 5.0
+    assert (
+        run_headless("oscillator", seconds=0.0, events=[Event(0, "solve", "show", 1)]).state.root
+        == 5.0
+    )
 
 
 # Events ---------------------------------------------------------------------------------------
 
 
 def test_of_a_drag_within_one_step_only_the_last_place_is_kept() -> None:
-    world = advanced(a_world(), 4)
+    world = advanced_world(make_world(), 4)
     for k in range(10):
         world.change({"omega": 3.0 + 0.1 * k})
     for k in range(10):
@@ -281,7 +284,7 @@ def test_of_a_drag_within_one_step_only_the_last_place_is_kept() -> None:
 
 
 def test_every_press_is_kept() -> None:
-    world = a_world()
+    world = make_world()
     world.press("kick")
     world.press("kick")
     assert [e.kind for e in world.events].count("press") == 2
@@ -291,7 +294,7 @@ def test_events_are_bounded_and_a_run_that_lost_some_says_so(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(run_module, "MAX_EVENTS", 5)
-    world = a_world()
+    world = make_world()
     for _ in range(4):
         world.press("kick")
         world.advance()
@@ -302,7 +305,7 @@ def test_events_are_bounded_and_a_run_that_lost_some_says_so(
     about = world.recording().about
     assert about["changes_complete"] is False
     with pytest.raises(LabError, match="cannot be run again exactly"):
-        events_of(about)
+        events_from_recording(about)
     with pytest.raises(LabError, match="export the run as JSON"):
         world.command()
     world.reset()
@@ -314,73 +317,73 @@ def test_events_are_bounded_and_a_run_that_lost_some_says_so(
 
 def _pushed(world: World) -> None:
     solved(world)
-    advanced(world, 7)
+    advanced_world(world, 7)
     world.change({"omega": 0.1 + 0.2, "noisy": True})
-    advanced(world, 3)
+    advanced_world(world, 3)
     world.press("kick")
     world.hold("pull", (0.1 + 0.2, -1e-7, 1.0))
-    advanced(world, 6)
+    advanced_world(world, 6)
     world.change({"shape": "square", "guess": 16.0})
     world.iterate()
-    advanced(world, 1)
+    advanced_world(world, 1)
     world.iterate()
     world.hold("pull", None)
     world.press("kick")
     world.press("kick")
-    advanced(world, 5)
+    advanced_world(world, 5)
     world.show(1)
-    advanced(world, 2)
+    advanced_world(world, 2)
 
 
 def _untouched(world: World) -> None:
     solved(world)
-    advanced(world, 20)
+    advanced_world(world, 20)
 
 
 def _changed_at_the_end(world: World) -> None:
     solved(world)
-    advanced(world, 3)
+    advanced_world(world, 3)
     world.change({"omega": 5.0})
 
 
 def _restarted(world: World) -> None:
     solved(world)
-    advanced(world, 30)
+    advanced_world(world, 30)
     world.change({"start": -0.5})
     solved(world)
-    advanced(world, 10)
+    advanced_world(world, 10)
     world.change({"omega": 7.0})
-    advanced(world, 10)
+    advanced_world(world, 10)
 
 
-STORIES = [_pushed, _untouched, _changed_at_the_end, _restarted]
+SCENARIOS = [_pushed, _untouched, _changed_at_the_end, _restarted]
 
 
-@pytest.mark.parametrize("story", STORIES)
+@pytest.mark.parametrize("story", SCENARIOS)
 def test_the_command_line_reproduces_the_run(story: Callable[[World], None]) -> None:
-    world = World(find("oscillator"), {"start": -0.3, "gain": 1 / 3}, seed=7)
+    world = World(find_lab("oscillator"), {"start": -0.3, "gain": 1 / 3}, seed=7)
     story(world)
     again = run_command(world.command())
-    assert same(again, world)
+    assert same_recording(again, world)
     assert again.command() == world.command()
 
 
-@pytest.mark.parametrize("story", STORIES)
+@pytest.mark.parametrize("story", SCENARIOS)
 def test_an_exported_run_runs_again_bit_for_bit(story: Callable[[World], None]) -> None:
-    world = World(find("oscillator"), {"start": -0.3, "gain": 1 / 3}, seed=7)
+    world = World(find_lab("oscillator"), {"start": -0.3, "gain": 1 / 3}, seed=7)
     story(world)
     about = json.loads(world.recording().json())
-    again = run(
+    again = run_headless(
         about["lab"],
         about["params"],
         seed=about["seed"],
         seconds=about["covers"]["to"],
-        events=events_of(about),
+        events=events_from_recording(about),
     )
     assert again.recording().json() == world.recording().json()
 
 
-DEEDS = st.lists(
+OPERATIONS = st.lists(
     st.one_of(
         st.tuples(st.just("advance"), st.integers(1, 30)),
         st.tuples(st.just("iterate"), st.integers(1, 4)),
@@ -397,14 +400,14 @@ DEEDS = st.lists(
 )
 
 
-@given(DEEDS, st.integers(0, 2**32 - 1))
+@given(OPERATIONS, st.integers(0, 2**32 - 1))
 @settings(deadline=None, max_examples=60)
 def test_whatever_is_done_can_be_done_again(deeds: list[tuple[str, Any]], seed: int) -> None:
-    world = World(find("oscillator"), seed=seed)
+    world = World(find_lab("oscillator"), seed=seed)
     for deed, value in deeds:
         match deed:
             case "advance":
-                advanced(world, value)
+                advanced_world(world, value)
             case "iterate":
                 for _ in range(value):
                     world.iterate()
@@ -420,20 +423,24 @@ def test_whatever_is_done_can_be_done_again(deeds: list[tuple[str, Any]], seed: 
             case _:
                 world.change({deed: value})
     again = run_command(world.command())
-    assert same(again, world)
+    assert same_recording(again, world)
     assert again.solving == world.solving
     assert again.state.root == world.state.root
     about = json.loads(world.recording().json())
-    replayed = run(
-        "oscillator", about["params"], seed=seed, seconds=world.t, events=events_of(about)
+    replayed = run_headless(
+        "oscillator",
+        about["params"],
+        seed=seed,
+        seconds=world.t,
+        events=events_from_recording(about),
     )
-    assert same(replayed, world)
+    assert same_recording(replayed, world)
     assert replayed.solving == world.solving
     assert replayed.snapshots.iterations == world.snapshots.iterations
 
 
 def test_there_and_back_within_a_step_starts_the_solver_again_in_the_replay_too() -> None:
-    world = solved(a_world())
+    world = solved(make_world())
     world.change({"guess": 16.0})
     world.change({"guess": 9.0})
     assert world.solving
@@ -444,30 +451,32 @@ def test_there_and_back_within_a_step_starts_the_solver_again_in_the_replay_too(
 
 
 def test_the_arm_runs_again_bit_for_bit() -> None:
-    world = World(find("joint-control"), {"noise": 0.01, "integrator": "rk4"}, seed=9)
-    advanced(world, 20)
+    world = World(find_lab("joint-control"), {"noise": 0.01, "integrator": "rk4"}, seed=9)
+    advanced_world(world, 20)
     world.press("push")
-    advanced(world, 5)
+    advanced_world(world, 5)
     world.hold("pull", (0.4, 0.2, 0.7))
-    advanced(world, 20)
+    advanced_world(world, 20)
     world.hold("pull", None)
     world.change({"kp": 777.0, "torque_limits": False})
-    advanced(world, 20)
-    assert same(run_command(world.command()), world)
+    advanced_world(world, 20)
+    assert same_recording(run_command(world.command()), world)
     about = json.loads(world.recording().json())
-    again = run(about["lab"], about["params"], seed=9, seconds=world.t, events=events_of(about))
-    assert same(again, world)
+    again = run_headless(
+        about["lab"], about["params"], seed=9, seconds=world.t, events=events_from_recording(about)
+    )
+    assert same_recording(again, world)
 
 
 def test_a_diverged_run_runs_again() -> None:
-    world = World(find("troublesome"))
-    advanced(world, 5)
+    world = World(find_lab("troublesome"))
+    advanced_world(world, 5)
     world.change({"fault": "trouble"})
-    advanced(world, 5)
+    advanced_world(world, 5)
     assert world.trouble
     again = run_command(world.command())
     assert (again.trouble, again.steps) == (world.trouble, world.steps)
-    assert same(again, world)
+    assert same_recording(again, world)
 
 
 # Wrong use ------------------------------------------------------------------------------------
@@ -476,39 +485,41 @@ def test_a_diverged_run_runs_again() -> None:
 @pytest.mark.parametrize("seconds", [-0.01, math.nan, math.inf, MAX_STEPS * 0.01 + 1.0])
 def test_a_duration_out_of_range_is_refused(seconds: float) -> None:
     with pytest.raises(ParameterError, match="takes a number from 0 to 20000"):
-        run("oscillator", seconds=seconds)
+        run_headless("oscillator", seconds=seconds)
 
 
 def test_an_unknown_lab_is_refused_with_the_names_there_are() -> None:
     with pytest.raises(UnknownLab, match=r"no lab is named 'nope'; there are .*joint-control"):
-        run("nope")
+        run_headless("nope")
 
 
 def test_a_change_beyond_the_end_is_refused() -> None:
     with pytest.raises(ParameterError, match=r"a change at 2 s lies beyond the run's 1 s"):
-        run("oscillator", seconds=1.0, events=[Event(200, "set", "omega", 3.0)])
+        run_headless("oscillator", seconds=1.0, events=[Event(200, "set", "omega", 3.0)])
 
 
 def test_a_change_that_trouble_forestalled_is_no_error() -> None:
     late = [Event(50, "set", "fault", "none")]
-    assert run("troublesome", {"fault": "trouble"}, seconds=1.0, events=late).steps == 1
+    assert run_headless("troublesome", {"fault": "trouble"}, seconds=1.0, events=late).steps == 1
 
 
 def test_a_restart_in_mid_run_is_refused_and_at_the_start_is_not() -> None:
     with pytest.raises(ParameterError, match="start restarts the run: give it with --set"):
-        run("oscillator", seconds=1.0, events=[Event(5, "set", "start", 0.5)])
-    world = run("oscillator", seconds=1.0, events=[Event(0, "set", "start", 0.5)])
+        run_headless("oscillator", seconds=1.0, events=[Event(5, "set", "start", 0.5)])
+    world = run_headless("oscillator", seconds=1.0, events=[Event(0, "set", "start", 0.5)])
     assert world.recording().channels["x"][0] == 0.5
 
 
 def test_events_are_sorted_by_time() -> None:
     events = [Event(20, "set", "omega", 3.0), Event(10, "set", "omega", 4.0)]
-    assert run("oscillator", seconds=1.0, events=events).params.model_dump()["omega"] == 3.0
+    assert (
+        run_headless("oscillator", seconds=1.0, events=events).params.model_dump()["omega"] == 3.0
+    )
 
 
 def test_progress_is_told_from_the_start_on_and_rises() -> None:
     told: list[float] = []
-    run("oscillator", seconds=5.0, progress=told.append)
+    run_headless("oscillator", seconds=5.0, progress=told.append)
     solving = len(told) - 5  # one after every iteration of the solver, before time starts
     assert told == pytest.approx([0.0] * solving + [0.002, 0.202, 0.402, 0.602, 0.802])
 
@@ -527,7 +538,7 @@ def test_progress_is_told_from_the_start_on_and_rises() -> None:
     ],
 )
 def test_events_are_read_from_text(at: str, what: str, event: Event) -> None:
-    assert parse_event(find("oscillator"), at, what) == event
+    assert parse_event(find_lab("oscillator"), at, what) == event
 
 
 @pytest.mark.parametrize(
@@ -545,7 +556,7 @@ def test_events_are_read_from_text(at: str, what: str, event: Event) -> None:
 )
 def test_text_that_is_no_event_is_refused(at: str, what: str, sentence: str) -> None:
     with pytest.raises(ParameterError, match=sentence):
-        parse_event(find("oscillator"), at, what)
+        parse_event(find_lab("oscillator"), at, what)
 
 
 @pytest.mark.parametrize(
@@ -571,12 +582,12 @@ def test_text_that_is_no_event_is_refused(at: str, what: str, sentence: str) -> 
 def test_a_change_of_an_export_that_makes_no_sense_is_refused(wrong: dict[str, Any]) -> None:
     change = {"t": 0.0, "step": 0, "kind": "set", "name": "omega", "value": 3.0} | wrong
     with pytest.raises(LabError, match="no change of a run looks like"):
-        events_of({"changes_complete": True, "changes": [change]})
+        events_from_recording({"changes_complete": True, "changes": [change]})
 
 
 def test_a_recording_knows_all_that_reproduces_it() -> None:
-    world = World(find("oscillator"), {"omega": 3.0}, seed=4)
-    advanced(world, 2)
+    world = World(find_lab("oscillator"), {"omega": 3.0}, seed=4)
+    advanced_world(world, 2)
     world.change({"omega": 4.0})
     about = world.recording().about
     assert about["lab"] == "oscillator"
@@ -594,7 +605,7 @@ def test_a_recording_knows_all_that_reproduces_it() -> None:
 
 def test_a_seed_fixes_the_noise() -> None:
     one, again, other = (
-        run("oscillator", {"noisy": True}, seconds=1.0, seed=seed).recording().rows
+        run_headless("oscillator", {"noisy": True}, seconds=1.0, seed=seed).recording().rows
         for seed in (1, 1, 2)
     )
     assert np.array_equal(one, again, equal_nan=True)

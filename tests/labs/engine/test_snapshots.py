@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from labs.engine.snapshots import OVERHEAD, Snapshots, flatten
+from labs.engine.snapshots import SNAPSHOT_OVERHEAD, Snapshots, flatten
 from labs.lab import Snapshot
 
 
@@ -23,7 +23,7 @@ def test_all_are_kept_while_there_is_room() -> None:
 
 
 def test_every_second_one_goes_when_it_is_full() -> None:
-    each = OVERHEAD + 800
+    each = SNAPSHOT_OVERHEAD + 800
     assert filled(8, 8 * each).iterations == [1, 2, 3, 4, 5, 6, 7, 8]
     assert filled(9, 8 * each).iterations == [1, 3, 5, 7, 9]
     assert filled(10, 8 * each).iterations == [1, 3, 5, 7, 9, 10]
@@ -31,7 +31,7 @@ def test_every_second_one_goes_when_it_is_full() -> None:
 
 @given(st.integers(1, 300), st.integers(1, 40))
 def test_the_bound_holds_and_both_ends_stay(count: int, room: int) -> None:
-    each = OVERHEAD + 800
+    each = SNAPSHOT_OVERHEAD + 800
     kept = filled(count, room * each)
     iterations = kept.iterations
     assert len(kept) <= max(room, 2)
@@ -45,7 +45,7 @@ def test_one_too_large_for_the_room_is_kept_all_the_same() -> None:
 
 
 def test_the_nearest_one_not_after_is_found() -> None:
-    kept = filled(9, 8 * (OVERHEAD + 800))  # 1, 3, 5, 7, 9
+    kept = filled(9, 8 * (SNAPSHOT_OVERHEAD + 800))  # 1, 3, 5, 7, 9
     found = [kept.at(k) for k in (0, 1, 2, 6, 9, 100)]
     assert [one.iteration for one in found if one] == [1, 1, 1, 5, 9, 9]
     assert Snapshots().at(3) is None

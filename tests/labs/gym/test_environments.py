@@ -13,10 +13,10 @@ from labs.errors import LabError
 from labs.gym.tables import TableEnv
 from labs.gym.torques import TorqueEnv
 from labs.problems.episodes import transition
-from labs.random_numbers import seeded
-from labs.tasks.random_walk.walks import HORIZON
+from labs.random_numbers import random_states
+from labs.tasks.random_walk.walks import MAX_STEPS
 
-NAMES = [*labs.gym.CONTINUOUS, *labs.gym.FINITE]
+NAMES = [*labs.gym.CONTINUOUS_HORIZONS, *labs.gym.FINITE_HORIZONS]
 VARIANTS: list[tuple[str, dict[str, Any]]] = [
     *((name, {}) for name in NAMES),
     ("GridWorld", {"map": "windy", "kings": True, "slip": 0.1}),
@@ -38,7 +38,7 @@ def test_gymnasiums_own_checker_has_nothing_to_say(name: str, settings: dict[str
         check_env(made(name, **settings), skip_render_check=False)
 
 
-@pytest.mark.parametrize("name", labs.gym.CONTINUOUS)
+@pytest.mark.parametrize("name", labs.gym.CONTINUOUS_HORIZONS)
 def test_a_robot_steps_bit_for_bit_as_in_the_lab(name: str) -> None:
     """Through a whole episode that `make` truncates; its start is that of the lab's generator."""
     env = gymnasium.make(f"orclab/{name}-v0")
@@ -46,7 +46,7 @@ def test_a_robot_steps_bit_for_bit_as_in_the_lab(name: str) -> None:
     assert isinstance(bare, TorqueEnv)
     lab, controls = bare.environment, np.random.default_rng(1)
     seen, info = env.reset(seed=7)
-    X = lab.starts(seeded(np.random.Generator(np.random.PCG64(7)), 1)[0], 1)
+    X = lab.initial_states(random_states(np.random.Generator(np.random.PCG64(7)), 1)[0], 1)
     assert np.array_equal(info["state"], X[0])
     truncated, steps = False, 0
     while not truncated:
@@ -59,7 +59,7 @@ def test_a_robot_steps_bit_for_bit_as_in_the_lab(name: str) -> None:
         assert not terminated
         assert env.observation_space.contains(seen)
         steps += 1
-    assert steps == lab.horizon == labs.gym.CONTINUOUS[name]
+    assert steps == lab.horizon == labs.gym.CONTINUOUS_HORIZONS[name]
 
 
 def test_a_table_draws_as_the_learners_do_and_ends_at_the_goal() -> None:
@@ -84,7 +84,7 @@ def test_a_walk_ends_at_its_ends_and_costs_there() -> None:
     assert env.reset(seed=0)[0] == 3
     rewards = [env.step(np.int64(1))[1:3] for _ in range(3)]
     assert rewards == [(0.0, False), (0.0, False), (1.0, True)]
-    assert labs.gym.FINITE["RandomWalk"] == HORIZON
+    assert labs.gym.FINITE_HORIZONS["RandomWalk"] == MAX_STEPS
 
 
 def test_seeds_repeat_and_without_one_episodes_differ() -> None:

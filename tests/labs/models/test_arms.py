@@ -7,19 +7,19 @@ import pinocchio as pin
 import pytest
 
 from labs.errors import LabError
-from labs.models.arms import ARMS, JOINTS, Arm, load
+from labs.models.arms import ARMS, JOINT_COUNTS, Arm, load_arm
 
 
 @pytest.fixture(params=list(ARMS))
 def arm(request: pytest.FixtureRequest) -> Arm:
-    return load(request.param)
+    return load_arm(request.param)
 
 
 def test_an_arm_is_consistent(arm: Arm) -> None:
     model = arm.model
-    assert load(arm.name) is arm
+    assert load_arm(arm.name) is arm
     assert arm.home.shape == (model.nq,) == (model.nv,) == arm.torque_limit.shape
-    assert JOINTS[arm.name] == model.nv
+    assert JOINT_COUNTS[arm.name] == model.nv
     assert np.all(np.isfinite(arm.torque_limit))
     assert np.all(arm.torque_limit > 0)
     assert arm.tip < model.nframes
@@ -57,7 +57,7 @@ def test_every_piece_can_be_drawn(arm: Arm) -> None:
     ("name", "rotor"), [("ur5", [0.255] * 3 + [0.061] * 3), ("panda", [0.1] * 7)]
 )
 def test_rotors_are_on_the_diagonal_of_the_mass_matrix(name: str, rotor: list[float]) -> None:
-    arm = load(name)
+    arm = load_arm(name)
     bare = arm.model.copy()
     bare.armature = np.zeros(bare.nv)
     with_rotors = pin.crba(arm.model, arm.model.createData(), arm.home)
@@ -66,12 +66,12 @@ def test_rotors_are_on_the_diagonal_of_the_mass_matrix(name: str, rotor: list[fl
 
 
 def test_the_panda_has_no_loose_fingers() -> None:
-    assert load("panda").model.nq == 7
-    assert sum("finger" in piece.mesh for piece in load("panda").visuals) == 2
+    assert load_arm("panda").model.nq == 7
+    assert sum("finger" in piece.mesh for piece in load_arm("panda").visuals) == 2
 
 
 def test_the_double_pendulum_is_the_textbook_one() -> None:
-    arm = load("double-pendulum")
+    arm = load_arm("double-pendulum")
     data = arm.model.createData()
     m, length, r, g = 2.0, 0.5, 0.03, 9.81
     inertia = m * (3 * r**2 + length**2) / 12
@@ -96,7 +96,7 @@ def test_the_double_pendulum_is_the_textbook_one() -> None:
 
 def test_the_scara_is_the_textbook_one() -> None:
     """Two links in the plane, and a quill whose weight only its own motor carries."""
-    arm = load("scara")
+    arm = load_arm("scara")
     data = arm.model.createData()
     q = np.array([0.3, 1.1, 0.05, -0.7])
     pin.framesForwardKinematics(arm.model, data, q)
@@ -113,4 +113,4 @@ def test_the_scara_is_the_textbook_one() -> None:
 
 def test_an_unknown_name_is_refused_with_those_there_are() -> None:
     with pytest.raises(LabError, match=r"'ur6'.*ur5, panda, double-pendulum"):
-        load("ur6")
+        load_arm("ur6")

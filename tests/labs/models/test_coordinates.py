@@ -2,7 +2,7 @@
 
 import pytest
 
-from labs.models.coordinates import coordinate_labels, names_in_sentences
+from labs.models.coordinates import coordinate_labels, state_and_control_names
 from labs.models.mechanisms import MECHANISMS, mechanism
 
 
@@ -22,9 +22,9 @@ def test_a_cart_slides_and_a_pole_turns() -> None:
 
 
 def test_states_and_controls_are_called_as_on_the_page() -> None:
-    assert names_in_sentences(mechanism("pendulum")) == (("q", "v"), ("u",))
-    x, u = names_in_sentences(mechanism("cart-pole"))
+    assert state_and_control_names(mechanism("pendulum")) == (("q", "v"), ("u",))
+    x, u = state_and_control_names(mechanism("cart-pole"))
     assert x == ("the cart's q", "the pole's q", "the cart's v", "the pole's v")
     assert u == ("u",)
-    x, u = names_in_sentences(mechanism("ur5"))
+    x, u = state_and_control_names(mechanism("ur5"))
     assert (x[1], x[7], u[5]) == ("q_2", "v_2", "u_6")

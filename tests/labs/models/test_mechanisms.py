@@ -9,7 +9,7 @@ import pytest
 from labs.algorithms.integrators import INTEGRATORS
 from labs.errors import LabError
 from labs.models import cart_pole
-from labs.models.discrete import Discrete
+from labs.models.discrete import DiscreteMechanism
 from labs.models.mechanisms import MECHANISMS, Mechanism, mechanism
 
 G = 9.81
@@ -29,8 +29,8 @@ def differences(f: Callable[[np.ndarray], np.ndarray], at: np.ndarray) -> np.nda
 
 def test_the_cart_pole_obeys_the_equations_of_its_docstring() -> None:
     m = mechanism("cart-pole")
-    M, mass, l = cart_pole.CART, cart_pole.POLE, cart_pole.LENGTH / 2  # noqa: E741
-    inertia = mass * (cart_pole.LENGTH**2 / 12 + cart_pole.RADIUS**2 / 4)
+    M, mass, l = cart_pole.CART_MASS, cart_pole.POLE_MASS, cart_pole.POLE_LENGTH / 2  # noqa: E741
+    inertia = mass * (cart_pole.POLE_LENGTH**2 / 12 + cart_pole.POLE_RADIUS**2 / 4)
     X, U = points(m)
     for (_, theta, _, w), (u,) in zip(X, U, strict=True):
         left = np.array(
@@ -74,7 +74,7 @@ def test_derivatives_are_those_of_finite_differences(
 @pytest.mark.parametrize("method", INTEGRATORS)
 @pytest.mark.parametrize("name", ["pendulum", "acrobot", "cart-pole", "ur5"])
 def test_sensitivities_are_those_of_finite_differences(name: str, method: str) -> None:
-    d = Discrete(mechanism(name, 0.3, 0.2), 0.03, method)
+    d = DiscreteMechanism(mechanism(name, 0.3, 0.2), 0.03, method)
     X, U = points(d.mechanism)
     after, A, B = d.linearize(X, U)
     for i, (x, u) in enumerate(zip(X, U, strict=True)):
@@ -86,7 +86,7 @@ def test_sensitivities_are_those_of_finite_differences(name: str, method: str) -
 
 
 def test_a_rollout_repeats_steps() -> None:
-    d = Discrete(mechanism("cart-pole"), 0.02, "rk4")
+    d = DiscreteMechanism(mechanism("cart-pole"), 0.02, "rk4")
     U = np.array([[1.0], [-2.0], [0.5]])
     X = d.rollout(np.array([0.0, 0.1, 0.0, 0.0]), U)
     for t in range(3):
@@ -97,9 +97,11 @@ def test_what_holds_a_posture_holds_it() -> None:
     m = mechanism("ur5", payload=1.5)
     q = m.arm.home
     x = np.concatenate([q, np.zeros(6)])
-    np.testing.assert_allclose(m.f(x, m.holding(q)), np.zeros(12), atol=1e-9)
+    np.testing.assert_allclose(m.f(x, m.equilibrium_control(q)), np.zeros(12), atol=1e-9)
     upright = mechanism("cart-pole")
-    np.testing.assert_allclose(upright.holding(np.array([0.0, np.pi])), [0.0], atol=1e-9)
+    np.testing.assert_allclose(
+        upright.equilibrium_control(np.array([0.0, np.pi])), [0.0], atol=1e-9
+    )
 
 
 @pytest.mark.parametrize("name", MECHANISMS)
@@ -113,13 +115,13 @@ def test_the_tips_jacobian_is_that_of_finite_differences(name: str) -> None:
 
 def test_what_cannot_be_is_said() -> None:
     with pytest.raises(LabError, match=r"acrobot cannot rest .* joint 1, which has no motor"):
-        mechanism("acrobot").holding(np.array([0.5, 0.0]))
+        mechanism("acrobot").equilibrium_control(np.array([0.5, 0.0]))
     with pytest.raises(LabError, match=r"no mechanism is named 'unicycle'; there are pendulum"):
         mechanism("unicycle")
     with pytest.raises(LabError, match=r"no method is named 'rk9'; there are explicit-euler"):
-        Discrete(mechanism("pendulum"), 0.1, "rk9")
+        DiscreteMechanism(mechanism("pendulum"), 0.1, "rk9")
     with pytest.raises(LabError, match=r"h = 0.0: a step takes a positive time"):
-        Discrete(mechanism("pendulum"), 0.0)
+        DiscreteMechanism(mechanism("pendulum"), 0.0)
 
 
 @pytest.mark.parametrize("name", MECHANISMS)

@@ -5,18 +5,18 @@ import pinocchio as pin
 import pytest
 
 from labs.models.arms import double_pendulum
-from labs.models.pendulums import LENGTH, MASS, RADIUS, hanging, pendulum
+from labs.models.pendulums import ROD_LENGTH, ROD_MASS, ROD_RADIUS, pendulum, pendulum_arm
 
 G = 9.81
 
 
 def test_one_rod_obeys_the_equation_of_the_docstring() -> None:
     for q, v, b in ((0.7, -1.3, 0.0), (2.5, 4.0, 0.8)):
-        inertia = MASS * (LENGTH**2 / 3 + RADIUS**2 / 4)  # the rod has a radius
-        wanted = -(MASS * G * LENGTH / 2 * np.sin(q) + b * v) / inertia
+        inertia = ROD_MASS * (ROD_LENGTH**2 / 3 + ROD_RADIUS**2 / 4)  # the rod has a radius
+        wanted = -(ROD_MASS * G * ROD_LENGTH / 2 * np.sin(q) + b * v) / inertia
         found = pendulum(1, b).f(np.array([q, v]), 0.0)
         np.testing.assert_allclose(found, [v, wanted], rtol=1e-12)
-        slender = -3 * G / (2 * LENGTH) * np.sin(q) - 3 * b / (MASS * LENGTH**2) * v
+        slender = -3 * G / (2 * ROD_LENGTH) * np.sin(q) - 3 * b / (ROD_MASS * ROD_LENGTH**2) * v
         assert wanted == pytest.approx(slender, rel=2e-3)
 
 
@@ -57,7 +57,9 @@ def test_friction_takes_exactly_its_power(rods: int) -> None:
 
 
 def test_eigenvalues_are_the_small_swings() -> None:
-    omega = np.sqrt(MASS * G * LENGTH / 2 / (MASS * (LENGTH**2 / 3 + RADIUS**2 / 4)))
+    omega = np.sqrt(
+        ROD_MASS * G * ROD_LENGTH / 2 / (ROD_MASS * (ROD_LENGTH**2 / 3 + ROD_RADIUS**2 / 4))
+    )
     np.testing.assert_allclose(sorted(pendulum(1).eigenvalues.imag), [-omega, omega], rtol=1e-12)
     damped = pendulum(2, 0.5).eigenvalues
     assert damped.real.max() < 0.0
@@ -65,13 +67,15 @@ def test_eigenvalues_are_the_small_swings() -> None:
 
 
 def test_it_hangs_where_it_is_put_and_swings_as_anywhere() -> None:
-    place = hanging(2, (0.3, -0.4))
+    place = pendulum_arm(2, (0.3, -0.4))
     data = place.model.createData()
     pin.framesForwardKinematics(place.model, data, np.array([np.pi / 2, 0.0]))
     np.testing.assert_allclose(
-        data.oMf[place.tip].translation, [0.3, -0.4 + 2 * LENGTH, 0.25 + 2 * LENGTH], atol=1e-12
+        data.oMf[place.tip].translation,
+        [0.3, -0.4 + 2 * ROD_LENGTH, 0.25 + 2 * ROD_LENGTH],
+        atol=1e-12,
     )
-    assert hanging(2, (0.3, -0.4)) is place
+    assert pendulum_arm(2, (0.3, -0.4)) is place
     x = np.array([0.4, -0.9, 1.0, 2.0])
     wanted = pendulum(2).acceleration(x[:2], x[2:])
     found = pin.aba(place.model, data, x[:2], x[2:], np.zeros(2))

@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from labs.models.arms import ARMS, load
+from labs.models.arms import ARMS, load_arm
 from labs.models.plant import plant
 
 FORCE = np.array([3.0, -20.0, 11.0])
@@ -17,7 +17,7 @@ def robot(request: pytest.FixtureRequest) -> str:
 
 def at(robot: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     rng = np.random.default_rng(7)
-    home = load(robot).home
+    home = load_arm(robot).home
     q, v, tau = rng.normal(size=(3, len(home)))
     return home + 0.3 * q, v, 5.0 * tau
 
@@ -33,7 +33,7 @@ def drifting_acceleration(robot: str, q: np.ndarray, v: np.ndarray) -> np.ndarra
 def test_a_payload_is_a_point_mass_at_the_tip(robot: str) -> None:
     """(M + m J'J) q'' + h + m J'(J' v - gravity) = tau, from the model without payload."""
     q, v, tau = at(robot)
-    arm, payload = load(robot), 3.7
+    arm, payload = load_arm(robot), 3.7
     data = arm.model.createData()
     mass = pin.crba(arm.model, data, q)
     mass = np.triu(mass) + np.triu(mass, 1).T

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labs.models.discrete import Discrete
+from labs.models.discrete import DiscreteMechanism
 from labs.models.mechanisms import mechanism
 from labs.problems.optimal_control import OptimalControlProblem, rollout
 from labs.tasks.motion.cost import MotionCost, TipCost
@@ -29,7 +29,7 @@ def random_problem(
         rng.normal(size=k),
         TipCost(m, np.array([0.1, 0.3, 0.5]), 7.0),
     )
-    return OptimalControlProblem(Discrete(m, 0.02, method), cost, rng.normal(size=n), N)
+    return OptimalControlProblem(DiscreteMechanism(m, 0.02, method), cost, rng.normal(size=n), N)
 
 
 def simulate(p: OptimalControlProblem, U: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

@@ -36,7 +36,7 @@ def test_a_table_and_its_probabilities_are_one_mdp() -> None:
     for mdp in (table, random):
         np.testing.assert_array_equal(mdp.can_end, True)
         np.testing.assert_array_equal(mdp.reachable([0]), [True, True, True, False])
-        assert mdp.report([0]) == (
+        assert mdp.describe([0]) == (
             "4 states and 2 controls, 1 of the states terminal, 1 never reached from the start."
         )
 

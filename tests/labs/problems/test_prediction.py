@@ -8,12 +8,12 @@ from labs.problems.finite_mdp import FiniteMDP
 from labs.problems.prediction import (
     PredictionTask,
     empty_episode,
-    importance,
+    importance_ratio,
     prediction_task,
     sample_episode,
     weighted_error,
 )
-from labs.random_numbers import seeded
+from labs.random_numbers import random_states
 
 MDP = FiniteMDP(
     np.array([[1.0, 2.0, 4.0], [3.0, 5.0, 7.0], [0.0, 0.0, 0.0]]),
@@ -32,7 +32,7 @@ POLICY = np.array([[0.5, 0.0, 0.5], [0.25, 0.75, 0.0], [1.0, 0.0, 0.0]])
 
 def counted(task: PredictionTask, episodes: int) -> tuple[np.ndarray, np.ndarray]:
     """(X, U) how often each control was applied and (X, U, X) where it led."""
-    room, random = empty_episode(task.task.horizon), seeded(np.random.default_rng(1), 1)[0]
+    room, random = empty_episode(task.task.horizon), random_states(np.random.default_rng(1), 1)[0]
     led = np.zeros((3, 3, 3))
     for _ in range(episodes):
         T = sample_episode(task, random, room)
@@ -66,9 +66,9 @@ def test_the_ratio_turns_one_policy_s_mean_into_another_s() -> None:
     wanted = np.array([[0.1, 0.0, 0.9], [1.0, 0.0, 0.0], [0.3, 0.3, 0.4]])
     wide = np.full((3, 3), 1 / 3)
     task = prediction_task(MDP, wide, np.zeros(3), [0], 30, target=wanted)
-    ratios = np.array([[importance(task, x, u) for u in range(3)] for x in range(3)])
+    ratios = np.array([[importance_ratio(task, x, u) for u in range(3)] for x in range(3)])
     np.testing.assert_allclose(ratios * wide, wanted, atol=1e-15)
-    assert importance(prediction_task(MDP, wide, np.zeros(3), [0], 30), 0, 1) == 1.0
+    assert importance_ratio(prediction_task(MDP, wide, np.zeros(3), [0], 30), 0, 1) == 1.0
     with pytest.raises(LabError, match="never tries"):
         prediction_task(MDP, POLICY, np.zeros(3), [0], 30, target=wide)
 

@@ -11,7 +11,7 @@ from labs.lab import Handle, Inputs, Lab, Measurement, State
 from labs.params import Group, Params, Value
 from labs.plots import Line, TimeSeries
 from labs.scene import Scene, cell_at, cell_centers
-from labs.tunables import LONGEST_TEXT
+from labs.tunables import MAX_TEXT_LENGTH
 
 SIZE = 0.1
 """[m] The side of a cell."""
@@ -26,7 +26,7 @@ class BoardParams(Params):
         "........\n........\n..###...\n....#...\n........\n........",
         "Map",
         rows=6,
-        max_length=LONGEST_TEXT,
+        max_length=MAX_TEXT_LENGTH,
     )
     """Rows of free cells (.) and walls (#)."""
     rate: float = KNOBS.knob(1.0, 0.0, 5.0, r"\omega", "rad/s")

@@ -9,10 +9,10 @@ from labs.appendix.integration.lab import Integration, IntegrationState
 from labs.appendix.integration.params import METHOD_NAMES, IntegrationParams
 from labs.lab import Inputs
 from labs.params import Value
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 
 LAB = Integration()
-EXPERIMENTS = Experiments("labs.appendix", "integration")
+EXPERIMENTS = ArticleExperiments("labs.appendix", "integration")
 ORDERS = {
     "euler": 1,
     "semi": 1,

@@ -15,7 +15,7 @@ from labs.appendix.integration.params import (
     IMPLICIT_METHODS,
     METHOD_NAMES,
 )
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from tests.labs.appendix.integration.runs import (
     LAB,
@@ -114,7 +114,7 @@ def test_local_errors_are_those_of_one_step() -> None:
 
 
 def test_the_study_starts_again_when_the_tableau_changes() -> None:
-    world = World(find("integration"))
+    world = World(find_lab("integration"))
     while world.solving:
         world.iterate()
     before = world.state.global_errors.copy()

@@ -16,7 +16,7 @@ from labs.appendix.integration.params import (
 from labs.errors import ParameterError
 from labs.models.pendulums import pendulum
 from labs.params import Value
-from labs.plots import field_names, measured
+from labs.plots import channel_names, field_names
 from labs.scene import NullScene
 from tests.labs.appendix.integration.runs import (
     EXPERIMENTS,
@@ -225,5 +225,5 @@ def test_every_channel_shown_is_measured() -> None:
     channels = set(LAB.measure(world.params, world.state))
     fields = set(LAB.fields(world.params, world.state))
     for plot in LAB.plots:
-        assert set(measured(plot)) <= channels
+        assert set(channel_names(plot)) <= channels
         assert set(field_names(plot)) <= fields

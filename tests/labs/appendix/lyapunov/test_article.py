@@ -6,16 +6,16 @@ from functools import cache
 import numpy as np
 import pytest
 
-from labs.appendix.lyapunov.closed_loop import FAR, stopped
+from labs.appendix.lyapunov.analysis import LyapunovAnalysis
+from labs.appendix.lyapunov.closed_loop import STATE_LIMIT, clip_states
 from labs.appendix.lyapunov.lab import Lyapunov, LyapunovState
 from labs.appendix.lyapunov.params import LyapunovParams
-from labs.appendix.lyapunov.runs import StateEnsemble
-from labs.appendix.lyapunov.study import LyapunovAnalysis
+from labs.appendix.lyapunov.state_ensemble import StateEnsemble
 from labs.lab import Inputs, Snapshot
 from labs.params import Value
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 
-EXPERIMENTS = Experiments("labs.appendix", "lyapunov")
+EXPERIMENTS = ArticleExperiments("labs.appendix", "lyapunov")
 verify = EXPERIMENTS.verify
 Settings = Mapping[str, Value]
 
@@ -32,19 +32,19 @@ def _after(seconds: float, items: tuple[tuple[str, Value], ...]) -> LyapunovStat
     return state
 
 
-def after(seconds: float, setting: Settings, **others: Value) -> LyapunovState:
+def state_after(seconds: float, setting: Settings, **others: Value) -> LyapunovState:
     """With the study done at the start."""
     return _after(seconds, tuple({**setting, **others}.items()))
 
 
 def study(setting: Settings, **others: Value) -> LyapunovAnalysis:
-    found = after(0.0, setting, **others).study
+    found = state_after(0.0, setting, **others).study
     assert found is not None
     return found
 
 
 def runs(seconds: float, setting: Settings, **others: Value) -> StateEnsemble:
-    found = after(seconds, setting, **others).runs
+    found = state_after(seconds, setting, **others).runs
     assert found is not None
     return found
 
@@ -95,7 +95,7 @@ def test_a_level_set_is_a_part_of_what_is_stable(setting: Settings) -> None:
     assert 100 * study(setting, candidate="energy").covered == pytest.approx(10, abs=0.5)
     X = params.plane.grid(81, 81).reshape(-1, 2)
     for _ in range(300):
-        X = stopped(params.loop.system.step(X, np.zeros((len(X), 1)), 0.1))
+        X = clip_states(params.loop.system.step(X, np.zeros((len(X), 1)), 0.1))
     assert 100 * (np.linalg.norm(X, axis=1) < 0.01).mean() == pytest.approx(45, abs=1.0)
     assert not runs(6.0, setting).left.any()
 
@@ -104,7 +104,7 @@ def test_a_level_set_is_a_part_of_what_is_stable(setting: Settings) -> None:
 def test_of_a_set_too_large_some_leave_and_most_come_back(setting: Settings) -> None:
     many = runs(6.0, setting)
     assert many.left.sum() == 40
-    lost = np.abs(many.X).max(axis=1) >= FAR
+    lost = np.abs(many.X).max(axis=1) >= STATE_LIMIT
     assert lost.sum() == 2
     assert np.linalg.norm(many.X[~lost], axis=1).max() < np.linalg.norm(many.X[lost], axis=1).min()
     assert np.linalg.norm(runs(11.0, setting).X[~lost], axis=1).max() < 0.1
@@ -163,6 +163,6 @@ def test_all_experiments_are_verified() -> None:
 def test_what_there_is_to_go_on_is_so() -> None:
     weak, strong = (study({"system": "lqr", "candidate": "riccati", "u_max": u}) for u in (0.5, 2))
     assert weak.covered < 0.1 * strong.covered
-    free = after(0.0, {"candidate": "lyapunov", "kd": 0.0})
+    free = state_after(0.0, {"candidate": "lyapunov", "kd": 0.0})
     assert free.study is None
     assert "the system must be stable" in free.failure

@@ -10,7 +10,7 @@ from labs.appendix.lyapunov.lab import Lyapunov
 from labs.appendix.lyapunov.params import LyapunovParams
 from labs.appendix.lyapunov.picture import change_colors
 from labs.resumable import run_to_completion
-from tests.labs.appendix.lyapunov.test_article import after, study
+from tests.labs.appendix.lyapunov.test_article import state_after, study
 
 RNG = np.random.default_rng(8)
 
@@ -23,7 +23,7 @@ def test_a_loop_is_what_its_law_makes_of_its_system(system: str) -> None:
     np.testing.assert_allclose(loop.A, A + B @ K, atol=1e-6)
     X = 0.1 * RNG.uniform(-1.0, 1.0, (5, 2)) * loop.window
     expected = [loop.system.step(x, K @ x, 0.1) for x in X]
-    np.testing.assert_allclose(run_to_completion(loop.ahead(X)), expected, atol=1e-9)
+    np.testing.assert_allclose(run_to_completion(loop.next_state(X)), expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("system", LOOPS)
@@ -71,7 +71,7 @@ def test_states_start_on_the_edge_of_the_set(view: str) -> None:
 
 
 def test_runs_start_again_when_they_are_over() -> None:
-    early, late = (after(t, {"candidate": "lyapunov"}).runs for t in (1.0, 13.01))
+    early, late = (state_after(t, {"candidate": "lyapunov"}).runs for t in (1.0, 13.01))
     assert early is not None
     assert late is not None
     assert early.k == late.k

@@ -5,30 +5,30 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.optimal_control.brachistochrone.lab import BrachistochroneState
 from labs.optimal_control.brachistochrone.race import (
     CIRCLE,
-    CURVES,
+    CURVE_NAMES,
     CYCLOID,
     KNEE,
     LINE,
     OPTIMISED,
     YOURS,
     BeadRace,
-    race_of,
+    simulate_race,
 )
 from labs.params import Value
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 
-EXPERIMENTS = Experiments("labs.optimal_control", "brachistochrone")
+EXPERIMENTS = ArticleExperiments("labs.optimal_control", "brachistochrone")
 verify = EXPERIMENTS.verify
 Settings = Mapping[str, Value]
 
 
 def solved(setting: Settings) -> World:
-    world = World(find("brachistochrone"), setting)
+    world = World(find_lab("brachistochrone"), setting)
     while world.solving:
         world.iterate()
     return world
@@ -40,13 +40,13 @@ def state(world: World) -> BrachistochroneState:
 
 
 def race(world: World) -> BeadRace:
-    return race_of(world.params, state(world).history.nodes)  # type: ignore[arg-type]
+    return simulate_race(world.params, state(world).history.nodes)  # type: ignore[arg-type]
 
 
-def behind(world: World) -> np.ndarray:
+def delays(world: World) -> np.ndarray:
     """[ms] the six, behind the fastest there is."""
     shown = world.lab.measure(world.params, world.state)
-    return np.array([shown.get(f"behind_{name}", np.inf) for name in CURVES])
+    return np.array([shown.get(f"behind_{name}", np.inf) for name in CURVE_NAMES])
 
 
 def excess(world: World) -> np.ndarray:
@@ -57,11 +57,11 @@ def excess(world: World) -> np.ndarray:
 @verify("Who is first?")
 def test_the_cycloid_is_first(setting: Settings) -> None:
     world = solved(setting)
-    late = behind(world)
+    late = delays(world)
     assert race(world).times[CYCLOID] == pytest.approx(0.806, abs=5e-4)
     assert late[CYCLOID] == pytest.approx(0.0, abs=1e-3)
     np.testing.assert_allclose(late[[CIRCLE, KNEE, LINE]], [25, 41, 204], atol=0.5)
-    assert race(world).order[0] == CYCLOID
+    assert race(world).finishing_order[0] == CYCLOID
     assert world.params.y_1 / world.params.x_1 < 0.3  # type: ignore[attr-defined]
     assert EXPERIMENTS.answer("Who is first?") == "The cycloid."
 
@@ -78,7 +78,7 @@ def test_all_are_equally_fast_at_b(setting: Settings) -> None:
 @verify("Bend your own")
 def test_a_curve_bent_by_hand_is_nearly_as_fast(setting: Settings) -> None:
     world = solved(setting)
-    late = behind(world)
+    late = delays(world)
     assert late[YOURS] == pytest.approx(7.4, abs=0.05)
     assert late[YOURS] < late[CIRCLE]
     law = world.lab.fields(world.params, world.state)["snell"]
@@ -87,7 +87,7 @@ def test_a_curve_bent_by_hand_is_nearly_as_fast(setting: Settings) -> None:
     assert (law[x < 0.3, YOURS] < 0.92).all()
     np.testing.assert_allclose(law[x > 0.7, YOURS], 1.0, atol=0.015)
     better = dict(zip(("x_1", "y_1", "x_2", "y_2", "x_3", "y_3"), BETTER, strict=True))
-    assert behind(solved({**setting, **better}))[YOURS] < 0.01
+    assert delays(solved({**setting, **better}))[YOURS] < 0.01
 
 
 BETTER = (0.0, 0.05, 0.07, 0.6, 0.94, 1.2)
@@ -101,7 +101,7 @@ def test_all_arrive_at_once_on_the_cycloid_alone(setting: Settings) -> None:
     np.testing.assert_allclose(race(world).times, shown["isochrone"], rtol=1e-6)
     lengths = [np.hypot(*np.diff(path, axis=0).T).sum() for path in race(world).paths]
     assert lengths[0] / lengths[4] == pytest.approx(5.0, rel=1e-5)
-    assert all(race(world).place(i) == 1 for i in range(6))
+    assert all(race(world).rank(i) == 1 for i in range(6))
     quadrant = solved({**setting, "shape": "circle"})
     spread = quadrant.lab.measure(quadrant.params, quadrant.state)["spread"]
     assert spread == pytest.approx(89, abs=0.5)
@@ -115,7 +115,7 @@ def test_newton_finds_the_cycloid(setting: Settings) -> None:
     gaps = excess(world)
     assert gaps[0] == pytest.approx(204, abs=0.5)
     assert len(gaps) - 1 == 12
-    first = int(np.flatnonzero(gaps < behind(world)[CIRCLE])[0])
+    first = int(np.flatnonzero(gaps < delays(world)[CIRCLE])[0])
     assert EXPERIMENTS.answer("From a straight line") == first
     assert gaps[-1] == pytest.approx(0.07, abs=5e-3)
     zeros = -np.log10(state(world).history.gradient[-4:])
@@ -154,7 +154,7 @@ def test_a_floor_is_run_along(setting: Settings) -> None:
     assert y.max() <= 0.5 + 1e-12
     assert len(along) > 10
     assert y[-1] < 0.5, "and up again"
-    late = behind(world)
+    late = delays(world)
     assert late[OPTIMISED] == pytest.approx(81, abs=0.5)
     assert late[LINE] == pytest.approx(1840, abs=10)
     assert EXPERIMENTS.answer("A floor") == "It runs along the floor for a while."
@@ -163,7 +163,7 @@ def test_a_floor_is_run_along(setting: Settings) -> None:
 @verify("With friction")
 def test_with_friction_another_curve_is_the_fastest(setting: Settings) -> None:
     world = solved(setting)
-    late = behind(world)
+    late = delays(world)
     assert late[CYCLOID] - late[OPTIMISED] == pytest.approx(17, abs=0.5)
     assert late[CYCLOID] - late[CIRCLE] == pytest.approx(12, abs=0.5)
     assert not race(world).descents[YOURS].arrived

@@ -8,7 +8,7 @@ from labs.algorithms import sqp
 from labs.optimal_control.brachistochrone.curves import cycloid
 from labs.optimal_control.brachistochrone.cycloid import cycloid_points, fastest_descent
 from labs.optimal_control.brachistochrone.descent import descend
-from labs.optimal_control.brachistochrone.fastest_polyline import FastestPolyline, grid
+from labs.optimal_control.brachistochrone.fastest_polyline import FastestPolyline, grid_abscissae
 from labs.optimal_control.brachistochrone.lab import OPTIONS
 
 G = 9.81
@@ -54,7 +54,7 @@ def test_with_friction_it_falls_plumb_and_joins_a_tilted_cycloid(
 
 def optimum(ends: tuple[float, float], mu: float, segments: int) -> float:
     """[s] the best polyline's time."""
-    problem = FastestPolyline(grid(ends[0], segments, "clustered"), ends[1], G, mu)
+    problem = FastestPolyline(grid_abscissae(ends[0], segments, "clustered"), ends[1], G, mu)
     line = ends[1] * problem.x[1:-1] / ends[0]
     at = sqp.solve(problem, problem.speeds(line), OPTIONS)
     assert at.converged

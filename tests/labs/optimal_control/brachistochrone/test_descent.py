@@ -21,7 +21,7 @@ def at(descent: Descent, t: float) -> BeadMotion:
 
 @pytest.mark.parametrize("mu", [0.0, 0.3])
 def test_an_inclined_plane_is_school_physics(mu: float) -> None:
-    descent = descend(curves.straight(2.0, 1.5), G, mu)
+    descent = descend(curves.straight_line(2.0, 1.5), G, mu)
     a = G * (1.5 - mu * 2.0) / 2.5
     assert descent.time == pytest.approx(np.sqrt(2.0 * 2.5 / a), rel=1e-14)
     now = at(descent, 0.4)

@@ -6,7 +6,7 @@ import pytest
 from labs.algorithms import sqp
 from labs.optimal_control.brachistochrone.cycloid import fastest_descent
 from labs.optimal_control.brachistochrone.descent import descend
-from labs.optimal_control.brachistochrone.fastest_polyline import FastestPolyline, grid
+from labs.optimal_control.brachistochrone.fastest_polyline import FastestPolyline, grid_abscissae
 from labs.optimal_control.brachistochrone.lab import OPTIONS
 from labs.resumable import run_to_completion
 
@@ -14,7 +14,7 @@ G, NONE = 9.81, np.zeros(0)
 
 
 def programme(across: float, depth: float, segments: int, **more: float) -> FastestPolyline:
-    return FastestPolyline(grid(across, segments, "clustered"), depth, G, **more)
+    return FastestPolyline(grid_abscissae(across, segments, "clustered"), depth, G, **more)
 
 
 def line_speeds(problem: FastestPolyline) -> np.ndarray:
@@ -73,7 +73,7 @@ def test_the_error_falls_at_the_order_of_the_grid(name: str, order: float) -> No
     best = 1e3 * fastest_descent(2.0, 1.0, G).time
     errors = []
     for N in (40, 80, 160):
-        problem = FastestPolyline(grid(2.0, N, name), 1.0, G)
+        problem = FastestPolyline(grid_abscissae(2.0, N, name), 1.0, G)
         at = sqp.solve(problem, line_speeds(problem), OPTIONS)
         assert at.converged
         errors.append(at.values.f / best - 1.0)

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from labs.engine.events import Event
-from labs.engine.headless import run
+from labs.engine.headless import run_headless
 from labs.optimal_control.brachistochrone.params import BrachistochroneParams
-from labs.optimal_control.brachistochrone.race import CYCLOID, OPTIMISED, race_of
+from labs.optimal_control.brachistochrone.race import CYCLOID, OPTIMISED, simulate_race
 from labs.scene import NullScene
 from tests.labs.optimal_control.brachistochrone.test_article import (
-    behind,
+    delays,
     excess,
     race,
     solved,
@@ -32,7 +32,7 @@ def test_who_has_arrived_is_told_in_order() -> None:
     while world.state.t < 1.3:
         world.advance()
     assert [line[:5] for line in notes()] == ["1. Cy", "2. Op", "3. Ci", "4. St", "5. St", "6. Yo"]
-    while state(world).since:
+    while state(world).race_steps:
         world.advance()
     assert world.state.t == pytest.approx(race(world).duration + 1.5, abs=0.011), "and once more"
 
@@ -63,7 +63,7 @@ def test_out_of_reach_is_said_and_nothing_is_solved() -> None:
     world.change({"mu": 0.1})
     while world.solving:
         world.iterate()
-    assert behind(world)[OPTIMISED] < 0.2
+    assert delays(world)[OPTIMISED] < 0.2
 
 
 @pytest.mark.parametrize("g", [1.62, 24.8])
@@ -85,7 +85,7 @@ def test_what_is_dragged_follows_the_hand() -> None:
     assert (world.params.x_b, world.params.z_b) == (1.5, 0.2)  # type: ignore[attr-defined]
     while world.solving:
         world.iterate()
-    assert behind(world)[OPTIMISED] < 0.1
+    assert delays(world)[OPTIMISED] < 0.1
     world.hold("A", (0.0, 0.1, 1.5))
     world.hold("knee", (0.0, 0.6, 0.7))
     assert (world.params.x_k, world.params.y_k) == (0.5, 0.8)  # type: ignore[attr-defined]
@@ -95,7 +95,7 @@ def test_what_is_dragged_follows_the_hand() -> None:
 
 def test_a_start_is_dragged_along_its_curve() -> None:
     params = BrachistochroneParams(race="starts", release=0.3)
-    start = race_of(params, np.zeros((2, 2))).starts[-1]
+    start = simulate_race(params, np.zeros((2, 2))).starts[-1]
     place = (0.0, *params.world_points(start)[0, 1:])
     world = solved({"race": "starts"})
     world.hold("release", place)
@@ -134,7 +134,9 @@ def test_looking_back_races_that_curve() -> None:
 
 def test_a_run_with_a_dragged_end_is_repeated_exactly() -> None:
     drag = Event(40, "hold", "B", (0.0, 1.5, 0.3))
-    once, again = (run("brachistochrone", {}, seconds=0.5, events=(drag,)) for _ in range(2))
+    once, again = (
+        run_headless("brachistochrone", {}, seconds=0.5, events=(drag,)) for _ in range(2)
+    )
     np.testing.assert_array_equal(
         once.recording().channels["speed"], again.recording().channels["speed"]
     )

@@ -3,15 +3,15 @@
 from collections.abc import Mapping
 
 from labs.engine.events import Event
-from labs.engine.headless import run
+from labs.engine.headless import run_headless
 from labs.engine.run import World
 from labs.optimal_control.collocation.lab import CollocationState
 from labs.optimal_control.collocation.params import CollocationParams
 from tests.labs.solving import Settings as Settings
-from tests.labs.solving import done as done
 from tests.labs.solving import readouts as tiles
 from tests.labs.solving import solve as solve
 from tests.labs.solving import solved_world
+from tests.labs.solving import stop_reason as stop_reason
 
 
 def solved(setting: Settings) -> World:
@@ -30,4 +30,4 @@ def params(world: World) -> CollocationParams:
 
 def readouts(setting: Settings, seconds: float, *events: Event) -> Mapping[str, float]:
     """What the page shows when the motion has been played once."""
-    return tiles(run("collocation", setting, seconds=seconds, events=events))
+    return tiles(run_headless("collocation", setting, seconds=seconds, events=events))

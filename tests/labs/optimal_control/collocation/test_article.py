@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 from tests.labs.optimal_control.collocation.simulation import (
     Settings,
-    done,
     params,
     readouts,
     solved,
     state,
+    stop_reason,
 )
 
-EXPERIMENTS = Experiments("labs.optimal_control", "collocation")
+EXPERIMENTS = ArticleExperiments("labs.optimal_control", "collocation")
 verify = EXPERIMENTS.verify
 
 
@@ -131,11 +131,11 @@ def _depths(setting: Settings) -> np.ndarray:
 @verify("Too little time")
 def test_what_cannot_be_done_is_infeasible(setting: Settings) -> None:
     world = solved(setting)
-    assert done(world).startswith("Infeasible")
+    assert stop_reason(world).startswith("Infeasible")
     assert state(world).failed
     assert state(world).history.violation[-1] > 0.5
     enough = solved({**setting, "horizon": 0.8})
-    assert done(enough).startswith("Converged after 4 iterations")
+    assert stop_reason(enough).startswith("Converged after 4 iterations")
     assert "infeasible" in str(EXPERIMENTS.answer("Too little time"))
 
 

@@ -4,16 +4,22 @@ import numpy as np
 import pytest
 
 from labs.algorithms.collocation_schemes import SCHEMES
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
-from labs.optimal_control.collocation.structure import MOST_CELLS, edges
+from labs.optimal_control.collocation.structure import MAX_CELLS, cell_starts
 from labs.scene import NullScene
-from tests.labs.optimal_control.collocation.simulation import Settings, done, solve, solved, state
+from tests.labs.optimal_control.collocation.simulation import (
+    Settings,
+    solve,
+    solved,
+    state,
+    stop_reason,
+)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_a_motion_in_pieces_joins_by_every_rule(scheme: str) -> None:
-    world = World(find("collocation"), {"scheme": scheme, "steps": 20.0})
+    world = World(find_lab("collocation"), {"scheme": scheme, "steps": 20.0})
     motion = state(world).motion
     pieces = 40 if scheme == "hermite-simpson" else 20
     assert motion.gaps.shape == (pieces, 2)
@@ -41,7 +47,7 @@ def test_costates_see_limits_of_the_state() -> None:
         "guess": "controls",
     }
     world = solved(limited)
-    assert done(world).startswith("Converged"), done(world)
+    assert stop_reason(world).startswith("Converged"), stop_reason(world)
     s = state(world)
     assert np.abs(s.motion.X[:, 1]).max() == pytest.approx(3.0, abs=1e-8)
     found = s.costates
@@ -56,7 +62,7 @@ WEAK: Settings = {"limited": True, "limit": 0.3, "horizon": 3.0, "guess": "contr
 def test_a_limited_position_is_kept_and_costs() -> None:
     """A weak motor swings back first: less far than it would."""
     free, held = solved(WEAK), solved({**WEAK, "position_limited": True, "position_margin": 1.5})
-    assert done(held).startswith("Converged"), done(held)
+    assert stop_reason(held).startswith("Converged"), stop_reason(held)
     assert state(free).motion.X[:, 0].min() < -1.6
     assert state(held).motion.X[:, 0].min() == pytest.approx(-1.5, abs=1e-8)
     assert state(held).history.cost[-1] > state(free).history.cost[-1]
@@ -77,15 +83,15 @@ def test_a_solve_that_ran_out_of_iterations_goes_on() -> None:
     violation = state(world).history.violation[-1]
     world.change({"iterations": 100.0})
     solve(world)
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
     assert state(world).history.violation[0] == violation
 
 
 def test_a_large_matrix_is_shown_in_blocks() -> None:
     world = solved({"system": "cart-pole", "steps": 60.0})
     structure = state(world).structure
-    assert max(structure.jacobian.shape) <= MOST_CELLS < structure.variables
-    shown = edges(structure.jacobian.shape[1], structure.variables)
+    assert max(structure.jacobian.shape) <= MAX_CELLS < structure.variables
+    shown = cell_starts(structure.jacobian.shape[1], structure.variables)
     assert shown[0] == 1.0
     assert shown[-1] <= structure.variables
 

@@ -5,10 +5,17 @@ import pytest
 
 from labs.models.mechanisms import mechanism
 from labs.scene import NullScene
-from tests.labs.experiments import Experiments
-from tests.labs.optimal_control.ddp.simulation import Settings, done, readouts, solve, solved, state
+from tests.labs.experiments import ArticleExperiments
+from tests.labs.optimal_control.ddp.simulation import (
+    Settings,
+    readouts,
+    solve,
+    solved,
+    state,
+    stop_reason,
+)
 
-EXPERIMENTS = Experiments("labs.optimal_control", "ddp")
+EXPERIMENTS = ArticleExperiments("labs.optimal_control", "ddp")
 verify = EXPERIMENTS.verify
 
 
@@ -86,7 +93,7 @@ def test_the_ur5_stays_wound_up(setting: Settings) -> None:
     assert state(wound).history.cost[-1] == pytest.approx(0.78, abs=0.005)
     assert state(still).history.cost[-1] == pytest.approx(0.037, abs=5e-4)
     for world in (wound, still):
-        assert done(world).startswith("Converged")
+        assert stop_reason(world).startswith("Converged")
         assert state(world).history.gradient[-1] < 1e-3
     ends = [state(world).plan.X[-1, :6] for world in (wound, still)]
     assert np.abs(ends[0] - ends[1]).max() > 1.0, "[rad] it is another posture"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.events import Event
 from labs.engine.run import World
 from labs.models.mechanisms import mechanism
@@ -16,11 +16,11 @@ from labs.tasks.motion.player import REST_STEPS
 from tests.labs.optimal_control.ddp.simulation import (
     UR5,
     Settings,
-    done,
     readouts,
     solve,
     solved,
     state,
+    stop_reason,
 )
 
 # The solver's clock ---------------------------------------------------------------------------
@@ -56,7 +56,7 @@ def test_a_diverging_guess_keeps_the_plan_and_says_so() -> None:
     good = state(world).plan
     world.change({"guess": 1.0})
     assert solve(world) == 1
-    assert done(world).startswith("The first guess diverges at step ")
+    assert stop_reason(world).startswith("The first guess diverges at step ")
     assert state(world).failed
     assert state(world).plan is good
     world.advance()
@@ -81,20 +81,20 @@ def test_a_diverging_first_guess_leaves_the_robot_at_rest() -> None:
 
 def test_a_solve_that_stops_short_goes_on_warm() -> None:
     world = solved({"iterations": 5.0})
-    assert done(world).startswith("Stopped short after 5 iterations")
+    assert stop_reason(world).startswith("Stopped short after 5 iterations")
     assert state(world).failed
     J = state(world).history.cost[-1]
     world.change({"iterations": 100.0})
     assert solve(world) < 25
     assert state(world).history.cost[0] == pytest.approx(J, rel=1e-12)
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
 
 
 def test_a_warm_start_keeps_to_a_new_limit() -> None:
     world = solved({})
     world.change({"limited": True})
     solve(world)
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
     assert np.abs(state(world).plan.U).max() == pytest.approx(0.5 * 4.905)
 
 
@@ -104,7 +104,7 @@ def test_a_warm_start_fits_another_horizon_and_step(changes: Settings) -> None:
     guessed = state(world).history.cost[0]
     world.change(changes)
     solve(world)
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
     assert state(world).history.cost[0] < 0.5 * guessed, "not from nothing"
     assert len(state(world).plan.U) == round(world.params.horizon / world.params.h)  # type: ignore[attr-defined]
 
@@ -136,14 +136,14 @@ def test_the_motion_is_played_rests_and_starts_over() -> None:
     for _ in range(200):
         world.advance()
     assert state(world).playback.finished(state(world).plan)
-    assert len(state(world).paid) == 2
+    assert len(state(world).run_costs) == 2
     ends = state(world).playback.x
     for _ in range(REST_STEPS):
         world.advance()
     np.testing.assert_array_equal(state(world).playback.x, ends)
     world.advance()
     assert state(world).playback.clock == 0
-    assert len(state(world).paid) == 2, "what was paid stays in view"
+    assert len(state(world).run_costs) == 2, "what was paid stays in view"
     world.advance()
     assert state(world).playback.clock == 2
 
@@ -161,7 +161,7 @@ def test_noise_of_the_motors_is_the_same_for_both() -> None:
     """Without gains they would move alike; the sensors' noise reaches the feedback alone."""
     world = solved({"noise_torque": 0.3, "control": 100.0, "posture": 0.0})
     world.iterate()
-    still = World(find("ddp"), {"noise_torque": 0.3, "guess": 0.1})
+    still = World(find_lab("ddp"), {"noise_torque": 0.3, "guess": 0.1})
     for _ in range(30):
         still.advance()  # before the first iteration there are no gains
     np.testing.assert_array_equal(state(still).playback.x[0], state(still).playback.x[1])
@@ -181,7 +181,7 @@ def test_weights_of_what_is_paid_are_the_present_ones() -> None:
         world.advance()
     cost = world.params.problem(100, 0.02).cost  # type: ignore[attr-defined]
     plan = state(world).plan
-    assert state(world).paid[FEEDBACK] == pytest.approx(cost.value(plan.X, plan.U), rel=1e-3)
+    assert state(world).run_costs[FEEDBACK] == pytest.approx(cost.value(plan.X, plan.U), rel=1e-3)
 
 
 def test_durations_are_shown_for_every_iteration() -> None:

@@ -1,9 +1,9 @@
 """Races of the lab direct-methods, run to their end."""
 
-from labs.engine.headless import run
+from labs.engine.headless import run_headless
 from labs.engine.run import World
 from labs.optimal_control.direct_methods.lab import DirectMethodsState
-from labs.optimal_control.direct_methods.race import Entrants
+from labs.optimal_control.direct_methods.method_runs import MethodRuns
 from tests.labs.solving import Settings as Settings
 from tests.labs.solving import solved_world
 
@@ -14,7 +14,7 @@ def solved(setting: Settings) -> World:
     return solved_world("direct-methods", setting)
 
 
-def race(setting: Settings) -> Entrants:
+def entrants(setting: Settings) -> MethodRuns:
     return state(solved(setting)).race
 
 
@@ -23,16 +23,16 @@ def state(world: World) -> DirectMethodsState:
     return world.state
 
 
-def iterations(found: Entrants) -> list[int]:
+def iterations(found: MethodRuns) -> list[int]:
     return [found[name].history.iterations for name in NAMES]
 
 
-def costs(found: Entrants) -> list[float]:
+def costs(found: MethodRuns) -> list[float]:
     return [float(found[name].history.cost[-1]) for name in NAMES]
 
 
-def missed(setting: Settings) -> tuple[float, float]:
+def goal_errors(setting: Settings) -> tuple[float, float]:
     """By how much [m] the robot and its open-loop ghost miss the goal, once played."""
-    world = run("direct-methods", setting, seconds=2.4)
-    feedback, open_loop = state(world).missed
+    world = run_headless("direct-methods", setting, seconds=2.4)
+    feedback, open_loop = state(world).goal_errors
     return float(feedback), float(open_loop)

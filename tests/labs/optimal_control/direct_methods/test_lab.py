@@ -5,22 +5,22 @@ import pytest
 
 from labs.algorithms import sqp
 from labs.algorithms.single_shooting import SingleShooting
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
+from labs.optimal_control.direct_methods.method_runs import outcome_message
 from labs.optimal_control.direct_methods.methods import TRANSCRIPTIONS, transcribe
 from labs.optimal_control.direct_methods.params import DirectMethodsParams
-from labs.optimal_control.direct_methods.race import verdict
 from labs.scene import NullScene
 from labs.tasks.direct.guesses import first_guess
 from tests.labs.optimal_control.direct_methods.simulation import (
     Settings,
     costs,
+    entrants,
     iterations,
-    race,
     solved,
     state,
 )
-from tests.labs.solving import done, solve
+from tests.labs.solving import solve, stop_reason
 
 
 def test_the_race_changes_nothing_about_a_method() -> None:
@@ -28,7 +28,7 @@ def test_the_race_changes_nothing_about_a_method() -> None:
     shooting = SingleShooting(params.problem, 20, 2)
     guess = first_guess(params, 20)
     alone = sqp.solve(shooting, shooting.pack(guess.U, guess.T), params.options)
-    entrant = race({})["single"]
+    entrant = entrants({})["single"]
     assert entrant.history.iterations == alone.iteration
     assert entrant.history.cost[-1] == alone.values.f
 
@@ -59,18 +59,18 @@ def test_a_diverging_guess_leaves_the_others_in_the_race() -> None:
         "steps": 1.0,
         "iterations": 2.0,
     }
-    found = race(setting)
+    found = entrants(setting)
     assert "first guess diverges" in found["single"].stopped
     assert found["collocation"].history.iterations == 2
     assert all(np.isfinite(at.history.cost).all() for at in found.values())
 
 
 def test_verdicts_name_who_failed_and_who_arrived() -> None:
-    found = race({"system": "upright", "segments": 10.0})
-    said = verdict(found)
+    found = entrants({"system": "upright", "segments": 10.0})
+    said = outcome_message(found)
     assert "Single shooting: infeasible" in said
     assert "Collocation: converged after 2 iterations." in said
-    assert verdict(race({"system": "mass"})).startswith("All three converged.")
+    assert outcome_message(entrants({"system": "mass"})).startswith("All three converged.")
 
 
 @pytest.mark.parametrize(("system", "said"), [("cart-pole", "the pole's v"), ("ur5", "the tip's")])
@@ -89,18 +89,18 @@ def test_all_methods_call_what_is_missed_the_same(system: str, said: str) -> Non
 @pytest.mark.parametrize("system", ["double-pendulum", "ur5"])
 def test_the_greatest_final_speed_is_found_by_all(system: str) -> None:
     """By the settings that the choice of the system brings."""
-    world = World(find("direct-methods"), {"objective": "fastest-end"})
+    world = World(find_lab("direct-methods"), {"objective": "fastest-end"})
     world.change({"system": system})
     solve(world)
-    assert done(world).startswith("All three converged")
+    assert stop_reason(world).startswith("All three converged")
 
 
 def test_a_solve_that_failed_is_begun_anew_and_one_that_ran_out_of_iterations_goes_on() -> None:
     world = solved({"limited": True, "limit": 0.3, "horizon": 1.0})
-    assert "infeasible" in verdict(state(world).race)
+    assert "infeasible" in outcome_message(state(world).race)
     world.change({"horizon": 2.0, "limited": False})
     solve(world)
-    again, first = state(world).race, race({})
+    again, first = state(world).race, entrants({})
     assert iterations(again) == iterations(first)
     assert costs(again) == costs(first)
     world = solved({"iterations": 3.0})
@@ -109,7 +109,7 @@ def test_a_solve_that_failed_is_begun_anew_and_one_that_ran_out_of_iterations_go
     solve(world)
     history = state(world).race["collocation"].history
     assert history.violation[0] == pytest.approx(violation, rel=1e-6)
-    assert verdict(state(world).race).startswith("All three converged")
+    assert outcome_message(state(world).race).startswith("All three converged")
 
 
 def test_another_plan_is_played_without_solving_again() -> None:

@@ -5,9 +5,9 @@ from labs.optimal_control.families.lab import FamiliesState
 from labs.optimal_control.families.params import FamiliesParams
 from labs.optimal_control.families.side_by_side import Results
 from tests.labs.solving import Settings as Settings
-from tests.labs.solving import done as done
 from tests.labs.solving import solve as solve
 from tests.labs.solving import solved_world
+from tests.labs.solving import stop_reason as stop_reason
 
 COARSE: Settings = {"nodes": 41.0, "hjb_steps": 20.0, "start": "cold"}
 """Where the tables do not matter."""

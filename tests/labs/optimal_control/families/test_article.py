@@ -5,18 +5,18 @@ import pytest
 
 from labs.optimal_control.families.motion import MethodMotion
 from labs.optimal_control.families.systems import PENDULUM
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 from tests.labs.optimal_control.families.simulation import (
     Settings,
     costs,
-    done,
     measured,
     results,
     solve,
     solved,
+    stop_reason,
 )
 
-EXPERIMENTS = Experiments("labs.optimal_control", "families")
+EXPERIMENTS = ArticleExperiments("labs.optimal_control", "families")
 verify = EXPERIMENTS.verify
 
 
@@ -28,7 +28,7 @@ def test_three_agree_and_the_rounded_problem_does_not(setting: Settings) -> None
         assert found[name] == pytest.approx(6.04, abs=5e-3), name
     assert found["dp"] == pytest.approx(6.16, abs=5e-3)
     assert all(motion.converged for motion in results(world).motions.values())
-    assert done(world).startswith("All four have ended")
+    assert stop_reason(world).startswith("All four have ended")
 
 
 @verify("A coarse grid")
@@ -95,7 +95,7 @@ def test_the_tables_find_what_is_far_from_the_guess(setting: Settings) -> None:
 def test_shooting_needs_a_good_start(setting: Settings) -> None:
     world = solved({**setting, "nodes": 41.0})
     assert not results(world).motions["pontryagin"].known
-    assert "The line search ends" in done(world)
+    assert "The line search ends" in stop_reason(world)
     world.change({"horizon": 0.7})
     solve(world)
     short = results(world).motions["pontryagin"]

@@ -12,7 +12,7 @@ from labs.optimal_control.families.closed_form import closed_form
 from labs.optimal_control.families.local_methods import (
     OPTIONS,
     motion_of_iterate,
-    optimise_directly,
+    solve_direct,
 )
 from labs.optimal_control.families.motion import MethodMotion, first_guess
 from labs.optimal_control.families.params import FamiliesParams
@@ -63,7 +63,7 @@ def test_multipliers_approach_the_costate_with_order_two() -> None:
 def test_what_has_not_converged_is_no_motion() -> None:
     """While it is on its way it is shown, and once it has stopped short it is not."""
     problem = FamiliesParams().problem(np.array([np.pi, 0.0]), 1.5)
-    seen = [m for m in optimise_directly(problem, first_guess(problem, 0.5), 30) if m]
+    seen = [m for m in solve_direct(problem, first_guess(problem, 0.5), 30) if m]
     assert all(motion.known and not motion.converged for motion in seen[:-1])
     assert seen[-1].converged
     program = Collocation(problem, 30, "trapezoidal")

@@ -14,7 +14,7 @@ from labs.optimal_control.families.cost import SwingCost
 from labs.optimal_control.families.motion import SAMPLES, first_guess
 from labs.optimal_control.families.params import BODIES, FamiliesParams
 from labs.optimal_control.families.systems import BLOCK_ON_A_LINE, PENDULUM
-from labs.optimal_control.families.tables import integrate, nearest_node, tabulate
+from labs.optimal_control.families.tables import discretize_to_mdp, integrate, nearest_node
 from labs.resumable import run_to_completion
 
 LIMITED = SwingCost(1.0, 0.05, 0.2, 10.0, 1.0, q_min=-0.5, q_max=2.0, rho=50.0)
@@ -66,7 +66,7 @@ def test_the_first_guess_starts_ends_and_swings_as_it_says() -> None:
         np.testing.assert_allclose(guess.X[-1], [0.0, 0.0], atol=0.1)
         assert np.abs(guess.U).max() <= 4.0
         inside = np.abs(guess.U) < 4.0
-        u = indirect.minimiser(problem, guess.X, guess.P)[:, 0]
+        u = indirect.hamiltonian_minimiser(problem, guess.X, guess.P)[:, 0]
         np.testing.assert_allclose(u[inside], guess.U[inside], atol=1e-9)
     assert np.abs(swung.X - straight.X)[:, 0].max() == pytest.approx(1.5, abs=0.1)
 
@@ -109,9 +109,9 @@ def test_the_table_is_the_best_of_all_sequences() -> None:
     params = FamiliesParams(horizon=0.6)
     problem, grid = params.problem(np.zeros(2), 0.6), params.grid(21)
     levels = np.array([-4.0, 0.0, 4.0])
-    mdp = run_to_completion(tabulate(problem, grid, 0.2, levels))
+    mdp = run_to_completion(discretize_to_mdp(problem, grid, 0.2, levels))
     final = np.array([problem.cost.final(x) for x in grid.nodes])
-    V, _ = backward_recursion.tables(mdp, final, 3)
+    V, _ = backward_recursion.value_and_policy_tables(mdp, final, 3)
     for start in (0, 100, 222, 440):
         paid = []
         for sequence in itertools.product(range(3), repeat=3):

@@ -46,7 +46,7 @@ def largest_control(params: LqrParams, found: list[LqrState]) -> float:
     return float(np.abs([s.u for s in found[1:]]).max())
 
 
-def settling(x: np.ndarray, band: float) -> float:
+def settling_time(x: np.ndarray, band: float) -> float:
     """[s] from when on |x| (k,) stays within the band."""
     return float(np.flatnonzero(np.abs(x) > band)[-1] + 1) * LAB.period
 
@@ -57,12 +57,12 @@ def closed_loop(params: LqrParams) -> np.ndarray:
     return np.asarray(np.sort(np.abs(np.linalg.eigvals(p.a + p.b @ params.regulator.gains[0]))))
 
 
-def bill(params: LqrParams, seconds: float) -> tuple[float, float]:
+def predicted_and_paid_cost(params: LqrParams, seconds: float) -> tuple[float, float]:
     """What x_0' P_0 x_0 promises and what is paid."""
     last = states(params, seconds)[-1]
     return last.predicted_cost, last.past_cost + last.stage_cost
 
 
-def unsolved(params: LqrParams) -> LqrState:
+def initial_state(params: LqrParams) -> LqrState:
     """At t = 0, without the study."""
     return LAB.init(params, np.random.default_rng(0))

@@ -8,21 +8,21 @@ import pytest
 from labs.optimal_control.lqr.linear_systems import linear_system
 from labs.optimal_control.lqr.params import LqrParams
 from labs.params import Value
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 from tests.labs.optimal_control.lqr.simulation import (
     LAB,
-    bill,
     closed_loop,
     deviations,
+    initial_state,
     largest_control,
     lqr_params,
-    settling,
+    predicted_and_paid_cost,
+    settling_time,
     solved,
     states,
-    unsolved,
 )
 
-EXPERIMENTS = Experiments("labs.optimal_control", "lqr")
+EXPERIMENTS = ArticleExperiments("labs.optimal_control", "lqr")
 
 
 @EXPERIMENTS.verify("What control costs")
@@ -31,8 +31,8 @@ def test_what_control_costs(setting: Mapping[str, Value]) -> None:
     weak, strong = states(dear, 12.0), states(cheap, 12.0)
     assert largest_control(dear, weak) == pytest.approx(0.986, abs=0.01)
     assert largest_control(cheap, strong) == pytest.approx(9.47, abs=0.05)
-    assert settling(deviations(dear, weak)[:, 0], 0.02) == pytest.approx(5.9, abs=0.05)
-    assert settling(deviations(cheap, strong)[:, 0], 0.02) == pytest.approx(1.4, abs=0.05)
+    assert settling_time(deviations(dear, weak)[:, 0], 0.02) == pytest.approx(5.9, abs=0.05)
+    assert settling_time(deviations(cheap, strong)[:, 0], 0.02) == pytest.approx(1.4, abs=0.05)
     assert closed_loop(cheap)[-1] == pytest.approx(0.947, abs=0.001)
     assert closed_loop(dear)[-1] == pytest.approx(0.986, abs=0.001)
 
@@ -41,15 +41,15 @@ def test_what_control_costs(setting: Mapping[str, Value]) -> None:
 def test_the_bill_is_known_in_advance(setting: Mapping[str, Value]) -> None:
     params = lqr_params(setting)
     run = states(params, 8.0)
-    promised, paid = bill(params, 8.0)
+    promised, paid = predicted_and_paid_cost(params, 8.0)
     assert promised == pytest.approx(278.95, abs=0.01)
     assert paid == pytest.approx(promised, rel=1e-9)
     totals = [s.past_cost + s.cost_to_go for s in run[1:]]
     np.testing.assert_allclose(totals, promised, rtol=1e-9)
     assert min(np.diff([s.past_cost for s in run])) >= 0.0
-    pole = bill(LqrParams(), 8.0)
+    pole = predicted_and_paid_cost(LqrParams(), 8.0)
     assert pole == pytest.approx((164.7, 178.7), abs=0.05)
-    near = bill(LqrParams(deviation=0.05), 8.0)
+    near = predicted_and_paid_cost(LqrParams(deviation=0.05), 8.0)
     assert near[1] / near[0] == pytest.approx(1.0022, abs=0.0003)
     assert EXPERIMENTS.answer("The bill is known in advance") == "279"
 
@@ -57,20 +57,20 @@ def test_the_bill_is_known_in_advance(setting: Mapping[str, Value]) -> None:
 @EXPERIMENTS.verify("Constant, then not")
 def test_constant_then_not(setting: Mapping[str, Value]) -> None:
     hundred, twice = lqr_params(setting), lqr_params(setting, horizon=200.0)
-    assert hundred.regulator.constant_gains == 61
-    assert twice.regulator.constant_gains == 161
-    assert LAB.fields(twice, unsolved(twice))["k_mark"] == pytest.approx([160.0, 160.0])
+    assert hundred.regulator.constant_gain_count == 61
+    assert twice.regulator.constant_gain_count == 161
+    assert LAB.fields(twice, initial_state(twice))["k_mark"] == pytest.approx([160.0, 160.0])
     np.testing.assert_allclose(
         hundred.regulator.gains[61:], twice.regulator.gains[161:], rtol=1e-10
     )
     heavy = lqr_params(setting, alpha=100.0).regulator
-    assert heavy.constant_gains == 61
+    assert heavy.constant_gain_count == 61
     steady = heavy.steady
     assert steady is not None
     ends, rests = heavy.gains[-1, 0, 1], steady.gain[0, 1]
     assert ends / rests == pytest.approx(2.4, abs=0.05)
     assert (np.abs(hundred.regulator.gains[-1]) < np.abs(steady.gain)).all()
-    assert EXPERIMENTS.answer("Constant, then not") == twice.regulator.constant_gains
+    assert EXPERIMENTS.answer("Constant, then not") == twice.regulator.constant_gain_count
 
 
 @EXPERIMENTS.verify("A short horizon does not see the fall")
@@ -163,7 +163,7 @@ def test_the_cheapest_way_mirrors_eigenvalues(setting: Mapping[str, Value]) -> N
     p = params.regulator.problem
     np.testing.assert_allclose(np.sort(np.linalg.eigvals(p.a)), [1.25, 2.0])
     np.testing.assert_allclose(np.sort(closed_loop(params)), [0.5, 0.8], atol=1e-5)
-    assert params.regulator.growth == pytest.approx(0.8, abs=1e-5)
+    assert params.regulator.spectral_radius == pytest.approx(0.8, abs=1e-5)
     run = states(params, 4.0)
     x = np.linalg.matrix_power(p.a + p.b @ params.regulator.gains[0], 20) @ [1.0, 1.0]
     np.testing.assert_allclose(run[-1].x, x, rtol=1e-9)

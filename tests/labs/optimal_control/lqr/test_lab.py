@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.lab import Inputs
 from labs.optimal_control.lqr.comparison import HORIZON_COUNT
@@ -11,7 +11,7 @@ from labs.optimal_control.lqr.lab import PUSH_STEPS, Lqr
 from labs.optimal_control.lqr.linear_systems import linear_system
 from labs.optimal_control.lqr.params import LqrParams
 from labs.optimal_control.lqr.region_of_attraction import GRID_POINTS, SYSTEM_CODES
-from labs.plots import field_names, measured
+from labs.plots import channel_names, field_names
 from labs.scene import NullScene
 from tests.labs.optimal_control.lqr.simulation import (
     LAB,
@@ -111,7 +111,7 @@ def test_off_its_rail_the_world_stops_and_says_so() -> None:
 def test_every_channel_is_plotted_or_read_out() -> None:
     params = LqrParams()
     state = solved(params)
-    shown = {name for plot in Lqr.plots for name in (*measured(plot), *field_names(plot))}
+    shown = {name for plot in Lqr.plots for name in (*channel_names(plot), *field_names(plot))}
     given = {**LAB.measure(params, state), **LAB.fields(params, state)}
     assert shown - {"to_end"} == set(given)
     assert "to_end" in LAB.measure(params.change({"policy": "window"}), state)
@@ -161,7 +161,7 @@ def test_durations_are_kept_apart_and_the_shortest_counts() -> None:
 
 def test_the_study_is_the_same_every_time() -> None:
     for system in ("cart-pole", "ur5"):
-        one, other = (World(find("lqr"), {"system": system}) for _ in range(2))
+        one, other = (World(find_lab("lqr"), {"system": system}) for _ in range(2))
         for world in (one, other):
             while world.solving:
                 world.iterate()

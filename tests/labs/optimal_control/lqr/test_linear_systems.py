@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labs.algorithms.stabilizability import hidden_modes
+from labs.algorithms.stabilizability import unstabilizable_modes
 from labs.errors import LabError
 from labs.optimal_control.lqr.linear_systems import LINEAR_SYSTEMS, SIMULATION_STEP, linear_system
 
@@ -42,7 +42,7 @@ def test_a_and_b_are_the_derivatives_of_the_simulation(name: str, period: float)
 def test_it_rests_where_it_should_and_can_be_regulated(name: str) -> None:
     system = linear_system(name)
     np.testing.assert_allclose(system.step(system.x_eq, system.u_eq), system.x_eq, atol=1e-9)
-    assert len(hidden_modes(*system.linear(0.02))) == 0
+    assert len(unstabilizable_modes(*system.linear(0.02))) == 0
     assert system.out_of_range(system.x_eq) == ""
 
 

@@ -33,7 +33,7 @@ def test_the_closed_form_is_the_mechanism(name: str) -> None:
         np.testing.assert_allclose(state_derivative(name, x, u[0]), mechanism.f(x, u), atol=1e-11)
 
 
-def brought_back(closed: RegulatedSystem, dx: np.ndarray) -> bool:
+def is_recovered(closed: RegulatedSystem, dx: np.ndarray) -> bool:
     """By the simulation of the scene: within reach all the time, and at rest in the end."""
     system = linear_system(closed.system)
     x, u = system.x_eq + dx, np.zeros(1)
@@ -65,7 +65,7 @@ def test_verdicts_are_those_of_the_simulation(
     rng = np.random.default_rng(5)
     points = np.column_stack([rng.choice(places, 12), rng.choice(speeds, 12)])
     found = closed.recovers(closed.from_phase_plane(points))
-    expected = [brought_back(closed, dx) for dx in closed.from_phase_plane(points)]
+    expected = [is_recovered(closed, dx) for dx in closed.from_phase_plane(points)]
     assert found.tolist() == expected
     assert 0 < found.sum() < 12, "both kinds were asked for"
 
@@ -85,7 +85,7 @@ def test_the_ellipsoid_keeps_its_promises() -> None:
         assert abs(closed.gains[0] @ dx) <= 3.0 + 1e-9
         after = transition @ dx
         assert after @ shape @ after < level
-        assert brought_back(closed, dx)
+        assert is_recovered(closed, dx)
 
 
 def test_an_unstable_loop_recovers_from_nowhere() -> None:
@@ -100,8 +100,8 @@ def test_the_largest_recoverable_deviation_is_the_edge() -> None:
     closed = loop("cart-pole", limit=10.0)
     edge = closed.largest_recoverable_deviation()
     inside, outside = closed.from_phase_plane(np.array([[edge, 0.0], [edge + 0.001, 0.0]]))
-    assert brought_back(closed, inside)
-    assert not brought_back(closed, outside)
+    assert is_recovered(closed, inside)
+    assert not is_recovered(closed, outside)
 
 
 def test_a_motor_strong_enough_brings_a_pendulum_back_from_anywhere() -> None:

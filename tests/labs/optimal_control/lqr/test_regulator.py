@@ -9,8 +9,8 @@ from labs.optimal_control.lqr.comparison import COMPARED_HORIZONS, HORIZON_COUNT
 from labs.optimal_control.lqr.regulator import (
     LQR_POLICIES,
     RegulatorSettings,
-    last_settled,
     regulator,
+    settling_step,
 )
 
 SETTINGS = RegulatorSettings("cart-pole", 0.02, (10.0, 20.0, 1.0, 2.0), 0.1, 60, "q", 1.0, "steady")
@@ -41,26 +41,26 @@ def test_the_steady_states_p_as_final_weight_makes_every_gain_steady() -> None:
     law = regulator(replace(SETTINGS, final="p", policy="window", horizon=20))
     assert law.steady is not None
     np.testing.assert_allclose(law.gains, np.tile(law.steady.gain, (20, 1, 1)), rtol=1e-8)
-    assert law.constant_gains == 20
+    assert law.constant_gain_count == 20
 
 
 def test_growth_of_one_step_and_of_a_whole_window() -> None:
     steady = regulator(SETTINGS)
     p = steady.problem
-    assert steady.growth == pytest.approx(
+    assert steady.spectral_radius == pytest.approx(
         np.abs(np.linalg.eigvals(p.a + p.b @ steady.gains[0])).max()
     )
     window = regulator(replace(SETTINGS, policy="window", horizon=3, alpha=0.0))
     turn = np.eye(4)
     for gain in window.gains:
         turn = (p.a + p.b @ gain) @ turn
-    assert window.growth**3 == pytest.approx(np.abs(np.linalg.eigvals(turn)).max())
-    assert window.growth > 1.0
+    assert window.spectral_radius**3 == pytest.approx(np.abs(np.linalg.eigvals(turn)).max())
+    assert window.spectral_radius > 1.0
 
 
 @pytest.mark.parametrize("system", ["cart-pole", "pendulum", "mass", "ur5"])
 def test_recursion_and_scipy_agree(system: str) -> None:
-    assert 0.0 <= regulator(replace(SETTINGS, system=system)).mismatch < 1e-9
+    assert 0.0 <= regulator(replace(SETTINGS, system=system)).riccati_error < 1e-9
 
 
 def test_shares_end_at_one_and_begin_at_the_final_weight() -> None:
@@ -77,12 +77,12 @@ def test_shares_end_at_one_and_begin_at_the_final_weight() -> None:
 
 def test_settled_is_the_last_step_before_which_all_are_constant() -> None:
     shares = np.ones((6, 2))
-    assert last_settled(shares) == 5
+    assert settling_step(shares) == 5
     shares[4, 1] = 1.02
-    assert last_settled(shares) == 3
+    assert settling_step(shares) == 3
     shares[0, 0] = 0.5
-    assert last_settled(shares) == -1
-    assert last_settled(np.zeros((0, 0))) == -1
+    assert settling_step(shares) == -1
+    assert settling_step(np.zeros((0, 0))) == -1
 
 
 def test_what_cannot_be_is_told() -> None:
@@ -99,7 +99,7 @@ def test_what_cannot_be_is_told() -> None:
     window = regulator(replace(SETTINGS, weights=blind, policy="window"))
     assert window.trouble == ""
     assert window.steady is None
-    assert window.mismatch == -1.0
+    assert window.riccati_error == -1.0
 
 
 def test_least_squares_agrees_until_the_fall_has_eaten_its_digits() -> None:

@@ -6,18 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labs.algorithms.periodic_lqr import Periodic
-from labs.engine.catalog import find
+from labs.algorithms.periodic_lqr import PeriodicRegulator
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.optimal_control.lqr_tracking.lab import LARGEST_DEVIATION, LqrTracking
 from labs.optimal_control.lqr_tracking.params import TrackingParams
 from labs.optimal_control.lqr_tracking.tracking import full_preview, limited_preview
 from labs.params import Value
 from labs.scene import NullScene
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 
-ENTRY = find("lqr-tracking")
-ARTICLE = Experiments("labs.optimal_control", "lqr_tracking")
+ENTRY = find_lab("lqr-tracking")
+ARTICLE = ArticleExperiments("labs.optimal_control", "lqr_tracking")
 Channels = Mapping[str, np.ndarray]
 
 
@@ -52,11 +52,11 @@ def lap_cost(setting: Mapping[str, Value], **changes: Value) -> float:
     return float(channels["lap_cost"][-1])
 
 
-def bill_of_the_linear_plant(lasting: Periodic) -> float:
+def linear_plant_lap_cost(lasting: PeriodicRegulator) -> float:
     """What a lap costs there once settled, step by step."""
     problem, x = lasting.problem, np.zeros(lasting.problem.n)
     for _ in range(20):
-        xs, us = problem.follow(lasting.policy, x)
+        xs, us = problem.rollout(lasting.policy, x)
         x = xs[-1]
     free_end = replace(problem, q_final=np.zeros_like(problem.q_final))
     return free_end.cost(xs, us)
@@ -164,7 +164,7 @@ def test_the_bill_is_as_foretold(setting: Mapping[str, Value]) -> None:
     lasting = full_preview(params_of(world).settings)
     foretold = lasting.lap_cost
     assert foretold == pytest.approx(10.72, abs=5e-3)
-    assert bill_of_the_linear_plant(lasting) == pytest.approx(foretold, rel=1e-7)
+    assert linear_plant_lap_cost(lasting) == pytest.approx(foretold, rel=1e-7)
     assert channels["lap_cost"][-1] == pytest.approx(foretold, rel=5e-4)
     assert channels["ghost_lap_cost"][-1] == pytest.approx(108.0, abs=0.5)
     wide, wider = recorded(9.0, setting, stroke=0.4)

@@ -8,21 +8,21 @@ import pinocchio as pin
 import pytest
 
 from labs.errors import LabError
-from labs.models.discrete import Discrete
+from labs.models.discrete import DiscreteMechanism
 from labs.models.mechanisms import mechanism
 from labs.optimal_control.lqr_tracking.laps import (
     CONTROL_PERIOD,
     INTEGRATION_METHOD,
     PATHS,
     PLANES,
-    Course,
+    ReferencePath,
     lap,
     side_force,
     tracked_point,
 )
 
-UR5 = Course("ur5", "circle", 0.15, 200)
-CART = Course("cart-pole", "circle", 0.4, 200)
+UR5 = ReferencePath("ur5", "circle", 0.15, 200)
+CART = ReferencePath("cart-pole", "circle", 0.4, 200)
 
 
 @pytest.mark.parametrize("name", PATHS)
@@ -61,7 +61,7 @@ def test_the_arm_goes_round_and_keeps_its_hand_level(plane: str, path: str) -> N
 
 
 @pytest.mark.parametrize("course", [UR5, CART, replace(UR5, plane="side")])
-def test_velocities_and_inverse_dynamics_are_those_of_the_motion(course: Course) -> None:
+def test_velocities_and_inverse_dynamics_are_those_of_the_motion(course: ReferencePath) -> None:
     """By central differences along the lap, which closes; u_ref by those of the velocity."""
     along, robot = lap(course), mechanism(course.robot)
     q, v = np.split(along.x_ref, 2, axis=1)
@@ -73,7 +73,7 @@ def test_velocities_and_inverse_dynamics_are_those_of_the_motion(course: Course)
 
     np.testing.assert_allclose(rate(q), v, atol=2e-5)
     torque = [pin.rnea(robot.model, robot.data, *row) for row in zip(q, v, rate(v), strict=True)]
-    expected = np.array(torque)[:, list(robot.driven)]
+    expected = np.array(torque)[:, list(robot.actuated_joints)]
     np.testing.assert_allclose(along.u_ref, expected, atol=2e-3)
     assert np.abs(along.u_ref).max() > 0.5
 
@@ -81,16 +81,16 @@ def test_velocities_and_inverse_dynamics_are_those_of_the_motion(course: Course)
 def test_feed_forward_takes_gravity_or_nothing() -> None:
     robot = mechanism("ur5")
     along = lap(UR5, "gravity")
-    np.testing.assert_allclose(along.u_ref[7], robot.holding(along.x_ref[7, :6]))
+    np.testing.assert_allclose(along.u_ref[7], robot.equilibrium_control(along.x_ref[7, :6]))
     np.testing.assert_array_equal(lap(UR5, "none").u_ref, 0.0)
 
 
 @pytest.mark.parametrize("course", [UR5, CART, replace(CART, path="square")])
 @pytest.mark.parametrize("force", [0.0, 7.0])
-def test_deviations_move_as_the_mechanism_does(course: Course, force: float) -> None:
+def test_deviations_move_as_the_mechanism_does(course: ReferencePath, force: float) -> None:
     """c is exact; A and B are the derivatives, by central differences."""
     along, robot = lap(course, "gravity", force), mechanism(course.robot)
-    discrete = Discrete(robot, CONTROL_PERIOD, INTEGRATION_METHOD)
+    discrete = DiscreteMechanism(robot, CONTROL_PERIOD, INTEGRATION_METHOD)
     for t in (0, 57, course.samples - 1):
         x, u = along.x_ref[t], along.u_ref[t]
         held = u + side_force(robot, x[: robot.nq], force)
@@ -117,11 +117,11 @@ def test_the_defect_says_how_far_the_reference_is_from_a_motion() -> None:
 
 
 @pytest.mark.parametrize("course", [UR5, CART])
-def test_a_side_force_does_its_work_at_what_is_tracked(course: Course) -> None:
+def test_a_side_force_does_its_work_at_what_is_tracked(course: ReferencePath) -> None:
     robot, rng = mechanism(course.robot), np.random.default_rng(0)
     q, v = lap(course).x_ref[30, : robot.nq], rng.standard_normal(robot.nq)
     moved = (tracked_point(robot, q + 1e-6 * v) - tracked_point(robot, q - 1e-6 * v))[1] / 2e-6
-    power = side_force(robot, q, 9.0) @ v[list(robot.driven)]
+    power = side_force(robot, q, 9.0) @ v[list(robot.actuated_joints)]
     assert power == pytest.approx(9.0 * moved, rel=1e-6)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from labs.models.mechanisms import mechanism
-from labs.optimal_control.lqr_tracking.laps import Course
+from labs.optimal_control.lqr_tracking.laps import ReferencePath
 from labs.optimal_control.lqr_tracking.tracking import (
     COSTED_JOINT,
     TrackingSettings,
@@ -14,7 +14,7 @@ from labs.optimal_control.lqr_tracking.tracking import (
 )
 
 SETTINGS = TrackingSettings(
-    Course("ur5", "circle", 0.15, 60), "none", 0.0, (100.0, 1.0, 20.0), (3.0, -2.0)
+    ReferencePath("ur5", "circle", 0.15, 60), "none", 0.0, (100.0, 1.0, 20.0), (3.0, -2.0)
 )
 
 

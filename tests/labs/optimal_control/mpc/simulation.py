@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.optimal_control.mpc.lab import MpcState
 from labs.optimal_control.mpc.params import MpcParams
@@ -15,7 +15,7 @@ Settings = Mapping[str, Value]
 
 
 @dataclass
-class Ran:
+class RecordedRun:
     """A run: its world, and what was measured after each step."""
 
     world: World
@@ -37,10 +37,10 @@ class Ran:
 
 
 def begun(setting: Settings) -> World:
-    return World(find("mpc"), setting)
+    return World(find_lab("mpc"), setting)
 
 
-def run(world: World, seconds: float) -> Ran:
+def run(world: World, seconds: float) -> RecordedRun:
     """So long; channels that are there all the time."""
     rows = []
     for _ in range(round(seconds / world.lab.period)):
@@ -48,8 +48,10 @@ def run(world: World, seconds: float) -> Ran:
         rows.append(world.lab.measure(world.params, world.state))
     names = [name for name in rows[-1] if all(name in row for row in rows)]
     last = {name: np.asarray(rows[-1][name])[None] for name in rows[-1]}
-    return Ran(world, last | {name: np.array([row[name] for row in rows]) for name in names})
+    return RecordedRun(
+        world, last | {name: np.array([row[name] for row in rows]) for name in names}
+    )
 
 
-def ran(setting: Settings, seconds: float) -> Ran:
+def run_for(setting: Settings, seconds: float) -> RecordedRun:
     return run(begun(setting), seconds)

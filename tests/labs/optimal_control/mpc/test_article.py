@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from labs.models.mechanisms import mechanism
-from tests.labs.experiments import Experiments
-from tests.labs.optimal_control.mpc.simulation import Settings, ran
+from tests.labs.experiments import ArticleExperiments
+from tests.labs.optimal_control.mpc.simulation import Settings, run_for
 
-EXPERIMENTS = Experiments("labs.optimal_control", "mpc")
+EXPERIMENTS = ArticleExperiments("labs.optimal_control", "mpc")
 verify = EXPERIMENTS.verify
 
 
 @verify("It does not do what it predicts")
 def test_it_leaves_its_first_plan(setting: Settings) -> None:
-    found = ran(setting, 0.61)
+    found = run_for(setting, 0.61)
     assert found.last("off_first") == pytest.approx(0.36, abs=0.01)
     assert found.last("promised") == pytest.approx(28.7, abs=0.05)
     assert found.last("over_horizon") == pytest.approx(35.6, abs=0.05)
@@ -25,7 +25,7 @@ def test_it_leaves_its_first_plan(setting: Settings) -> None:
 
 @verify("Let the horizon shrink")
 def test_a_shrinking_horizon_keeps_to_the_first_plan(setting: Settings) -> None:
-    found = ran(setting, 0.61)
+    found = run_for(setting, 0.61)
     assert found.last("off_first") < 1e-5
     assert found.last("over_horizon") == pytest.approx(found.last("promised"), rel=1e-6)
     assert found.last("promised") == pytest.approx(28.7, abs=0.05)
@@ -34,7 +34,7 @@ def test_a_shrinking_horizon_keeps_to_the_first_plan(setting: Settings) -> None:
 
 @verify("One iteration a period")
 def test_one_iteration_is_as_good_as_many(setting: Settings) -> None:
-    once, solved = ran(setting, 0.5), ran({**setting, "iterations": "all"}, 0.5)
+    once, solved = run_for(setting, 0.5), run_for({**setting, "iterations": "all"}, 0.5)
     assert once.last("paid") == pytest.approx(1.447, abs=5e-4)
     assert once.last("paid") == pytest.approx(solved.last("paid"), rel=1e-4)
     np.testing.assert_allclose(once.measured["v"], solved.measured["v"], atol=0.01)
@@ -46,11 +46,11 @@ def test_one_iteration_is_as_good_as_many(setting: Settings) -> None:
 
 @verify("Begin anew each time")
 def test_a_cold_start_does_not_swing_up(setting: Settings) -> None:
-    cold, warm = ran(setting, 4.0), ran({**setting, "start": "warm"}, 4.0)
+    cold, warm = run_for(setting, 4.0), run_for({**setting, "start": "warm"}, 4.0)
     assert abs(cold.measured["q"][-1, 1]) < 1e-3, "it hangs"
     assert abs(cold.measured["q"][-1, 0]) > 0.5, "off to the side"
     assert cold.last("miss") > 1.0
-    plans = [*cold.state.history.fan, cold.state.history.latest]
+    plans = [*cold.state.history.predictions, cold.state.history.latest]
     assert min(abs(plan.X[-1, 1]) for plan in plans if plan) > 2.0, "each means to have it up"
     assert warm.last("miss") < 1e-3
     assert warm.measured["miss"][200:].max() < 0.2, "up in two seconds"
@@ -58,7 +58,7 @@ def test_a_cold_start_does_not_swing_up(setting: Settings) -> None:
 
 @verify("One period late")
 def test_a_known_delay_is_none(setting: Settings) -> None:
-    late, known = ran(setting, 5.0), ran({**setting, "compensate": True}, 5.0)
+    late, known = run_for(setting, 5.0), run_for({**setting, "compensate": True}, 5.0)
     assert late.last("failures") > 100
     assert late.measured["miss"][-100:].max() > 0.5
     assert known.last("failures") == 0
@@ -68,19 +68,19 @@ def test_a_known_delay_is_none(setting: Settings) -> None:
 
 @verify("A dead end")
 def test_a_plan_that_can_stop_never_fails(setting: Settings) -> None:
-    found, rest = ran(setting, 1.5), ran({**setting, "end": "rest"}, 1.5)
+    found, rest = run_for(setting, 1.5), run_for({**setting, "end": "rest"}, 1.5)
     assert found.last("failures") > 30
     assert "Infeasible" in found.state.controller.status
     assert "the brake acts" in found.state.controller.status
     assert np.abs(found.measured["q"][:, 0]).max() == pytest.approx(0.5 + 0.11, abs=5e-3)
     assert rest.last("failures") == 0
     assert np.abs(rest.measured["q"][:, 0]).max() < 0.1, "timid"
-    assert ran({**setting, "steps": 10.0}, 1.5).last("failures") == 0
+    assert run_for({**setting, "steps": 10.0}, 1.5).last("failures") == 0
 
 
 @verify("Round the ball")
 def test_the_tip_slides_along_the_ball(setting: Settings) -> None:
-    found = ran(setting, 1.5)
+    found = run_for(setting, 1.5)
     body, ball = mechanism("ur5"), found.params.ball
     assert ball
     tips = np.array([body.tip(q) for q in found.measured["q"]])
@@ -89,7 +89,7 @@ def test_the_tip_slides_along_the_ball(setting: Settings) -> None:
     assert (clearance < 2e-3).sum() > 10, "and slides"
     assert found.measured["exceeded"].max() < 1e-3
     assert found.last("miss") < 1e-3
-    free = ran({**setting, "obstacle": False}, 1.5)
+    free = run_for({**setting, "obstacle": False}, 1.5)
     tips = np.array([body.tip(q) for q in free.measured["q"]])
     assert np.linalg.norm(tips - ball.center, axis=1).min() < 0.9 * ball.radius, "it is in the way"
 
@@ -98,7 +98,7 @@ def test_the_tip_slides_along_the_ball(setting: Settings) -> None:
 def test_it_stays_behind_what_moves(setting: Settings) -> None:
     eager: Settings = {"w_v": 0.001, "w_vf": 0.01}
     behind = [
-        ran({**setting, **changes}, 2.0).measured["miss"][-75:].mean()
+        run_for({**setting, **changes}, 2.0).measured["miss"][-75:].mean()
         for changes in ({}, {"turns": 0.5}, eager)
     ]
     assert behind[:2] == pytest.approx([0.02, 0.04], rel=0.1)
@@ -107,12 +107,12 @@ def test_it_stays_behind_what_moves(setting: Settings) -> None:
 
 @verify("A model that is wrong")
 def test_an_unknown_load_leaves_an_offset(setting: Settings) -> None:
-    found = ran(setting, 2.0)
+    found = run_for(setting, 2.0)
     assert found.last("miss") == pytest.approx(0.024, abs=5e-4)
     tip = mechanism("ur5").tip(found.measured["q"][-1])
     assert tip[2] < found.params.target[2] - 0.015, "below"
-    assert ran({**setting, "payload": 2.0}, 2.0).last("miss") == pytest.approx(0.010, abs=5e-4)
-    assert ran({**setting, "w_u": 0.01}, 2.0).last("miss") < 0.8 * found.last("miss")
+    assert run_for({**setting, "payload": 2.0}, 2.0).last("miss") == pytest.approx(0.010, abs=5e-4)
+    assert run_for({**setting, "w_u": 0.01}, 2.0).last("miss") < 0.8 * found.last("miss")
 
 
 def test_every_experiment_is_verified() -> None:

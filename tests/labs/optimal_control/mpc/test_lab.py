@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.lab import Inputs
-from labs.optimal_control.mpc.controller import cost_terms, problem
+from labs.optimal_control.mpc.controller import cost_terms, mpc_problem
 from labs.optimal_control.mpc.params import MpcParams
 from labs.optimal_control.mpc.plots import time_note
-from labs.optimal_control.mpc.systems import dynamics, goal_posture, system
+from labs.optimal_control.mpc.systems import controlled_system, dynamics, goal_posture
 from labs.scene import NullScene
-from tests.labs.optimal_control.mpc.simulation import begun, ran, run
+from tests.labs.optimal_control.mpc.simulation import begun, run, run_for
 
 
 @pytest.mark.parametrize(
@@ -23,7 +23,7 @@ from tests.labs.optimal_control.mpc.simulation import begun, ran, run
 )
 def test_the_goal_has_the_tip_at_the_ball(name: str, target: list[float]) -> None:
     q = goal_posture(name, np.array(target))
-    np.testing.assert_allclose(system(name).mechanism.tip(q), target, atol=1e-4)
+    np.testing.assert_allclose(controlled_system(name).mechanism.tip(q), target, atol=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ def test_a_target_out_of_reach_is_approached_and_the_arm_rests(
 ) -> None:
     """As near as its posture and the limits of the joints let it come."""
     names = ("target_x", "target_y", "target_z")
-    found = ran(dict(zip(names, target, strict=True)), 3.0)
+    found = run_for(dict(zip(names, target, strict=True)), 3.0)
     assert off - 1e-3 < found.last("miss") < off + 0.02
     assert np.abs(found.state.x[6:]).max() < 0.02
     assert found.last("failures") == 0
@@ -42,14 +42,14 @@ def test_a_target_out_of_reach_is_approached_and_the_arm_rests(
 
 def test_the_goal_is_where_nothing_costs() -> None:
     params = MpcParams()
-    at = problem(params, params.target)
+    at = mpc_problem(params, params.target)
     np.testing.assert_allclose(at.dynamics.step(at.x_ref, at.u_ref), at.x_ref, atol=1e-12)
     assert at.cost(np.tile(at.x_ref, (3, 1)), np.tile(at.u_ref, (2, 1))) == 0.0
 
 
 def test_the_terms_add_up_to_the_running_cost() -> None:
     params = MpcParams(system="double-pendulum")
-    at, rng = problem(params, params.target), np.random.default_rng(0)
+    at, rng = mpc_problem(params, params.target), np.random.default_rng(0)
     x, u = rng.standard_normal(4), rng.standard_normal(2)
     whole = at.cost(np.stack([x, at.x_ref]), u[None])
     assert cost_terms(params, params.target, x, u).sum() == pytest.approx(whole, rel=1e-12)
@@ -97,7 +97,7 @@ def test_a_push_strikes_once() -> None:
 
 
 def test_limits_that_are_reached_are_lit_and_named() -> None:
-    found = ran({"v_limit": 1.0}, 0.3)
+    found = run_for({"v_limit": 1.0}, 0.3)
     scene = NullScene()
     found.world.lab.draw(scene, found.params, found.state)
     assert any(name.startswith("limits of joint") for name in scene.names)
@@ -108,7 +108,7 @@ def test_limits_that_are_reached_are_lit_and_named() -> None:
 
 
 def test_handles_set_the_target_of_what_there_is() -> None:
-    lab = find("mpc").lab
+    lab = find_lab("mpc").lab
     point = (0.31, -0.22, 0.44)
     edit = {name: lab.edit(MpcParams(system=name), "target", point) for name in
             ("ur5", "cart-pole", "double-pendulum")}  # fmt: skip
@@ -131,9 +131,9 @@ def test_times_are_told_and_missed_deadlines_counted() -> None:
 
 
 def test_what_runs_away_is_said() -> None:
-    found = ran({"system": "cart-pole", "h": 0.04, "delay": 10.0, "compensate": False}, 0.1)
+    found = run_for({"system": "cart-pole", "h": 0.04, "delay": 10.0, "compensate": False}, 0.1)
     wild = found.state
-    wild.base = wild.base + np.array([0.0, 0.0, 500.0, 0.0])
+    wild.hold_start = wild.hold_start + np.array([0.0, 0.0, 500.0, 0.0])
     after = found.world.lab.step(found.params, Inputs(), wild)
     assert after.trouble.startswith("The robot went out of control at t = ")
 
@@ -142,7 +142,7 @@ def test_a_horizon_too_short_to_swing_up_the_pole_is_said() -> None:
     """As the menu leaves it; a period of 20 ms is enough."""
     swung = {}
     for h in (0.01, 0.02):
-        found = ran({"system": "cart-pole", "h": h}, 4.0)
+        found = run_for({"system": "cart-pole", "h": h}, 4.0)
         said = found.world.lab.notes(found.params, found.state)["said"]
         assert ("Plans look 0.30 s ahead, too short" in said) == (h == 0.01)
         swung[h] = found.last("miss")

@@ -6,23 +6,23 @@ from functools import cache
 import numpy as np
 import pytest
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.optimal_control.mpc_feasibility.lab import MpcFeasibility, MpcFeasibilityState
 from labs.optimal_control.mpc_feasibility.params import MpcFeasibilityParams
 from labs.optimal_control.mpc_feasibility.problem import feasibility
-from labs.optimal_control.mpc_feasibility.sets import sets_of
+from labs.optimal_control.mpc_feasibility.sets import compute_sets
 from labs.params import Value
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 from tests.labs.solving import readouts, solve
 
 Settings = Mapping[str, Value]
-EXPERIMENTS = Experiments("labs.optimal_control", "mpc_feasibility")
+EXPERIMENTS = ArticleExperiments("labs.optimal_control", "mpc_feasibility")
 verify = EXPERIMENTS.verify
 
 
 def begun(setting: Settings) -> World:
-    return World(find("mpc-feasibility"), setting)
+    return World(find_lab("mpc-feasibility"), setting)
 
 
 def run(setting: Settings, seconds: float) -> World:
@@ -37,7 +37,7 @@ def state(world: World) -> MpcFeasibilityState:
     return world.state
 
 
-def holds(title: str) -> float:
+def hold_time(title: str) -> float:
     return float(EXPERIMENTS.blocks[title]["hold"])
 
 
@@ -53,7 +53,7 @@ def sizes(setting: Settings, **changes: Value) -> Mapping[str, float]:
 
 @verify("Only the control is limited")
 def test_input_limits_alone_are_always_met(setting: Settings) -> None:
-    world = run(setting, holds("Only the control is limited"))
+    world = run(setting, hold_time("Only the control is limited"))
     assert readouts(world)["failures"] == 0.0
     farthest = state(world).path[:, 0].max()
     assert farthest - 0.8 == pytest.approx(0.41, abs=0.005)
@@ -63,11 +63,11 @@ def test_input_limits_alone_are_always_met(setting: Settings) -> None:
 
 @verify("A dead end")
 def test_it_runs_out_of_plans_and_into_the_wall(setting: Settings) -> None:
-    world = run(setting, holds("A dead end"))
+    world = run(setting, hold_time("A dead end"))
     found = readouts(world)
     assert found["failed"] == 28.0
     assert found["impact"] == pytest.approx(0.55, abs=0.005)
-    assert "x₁ ≤ 1 is exceeded at step 4" in state(world).why
+    assert "x₁ ≤ 1 is exceeded at step 4" in state(world).failure_reason
     channels = world.recording().channels
     t, feasible, stay = (channels[name] for name in ("t", "depth_feasible", "depth_invariant"))
     out = [t[np.flatnonzero(depth < 0.0)[0]] for depth in (stay, feasible)]
@@ -78,7 +78,7 @@ def test_it_runs_out_of_plans_and_into_the_wall(setting: Settings) -> None:
 
 @verify("Soft walls")
 def test_a_soft_limit_makes_the_crash_milder(setting: Settings) -> None:
-    seconds = holds("Soft walls")
+    seconds = hold_time("Soft walls")
     soft = readouts(run(setting, seconds))["impact"]
     hard = readouts(run({**setting, "fallback": "tail"}, seconds))["impact"]
     braked = readouts(run({**setting, "fallback": "brake"}, seconds))["impact"]
@@ -90,7 +90,7 @@ def test_a_soft_limit_makes_the_crash_milder(setting: Settings) -> None:
 
 @verify("The largest safe set")
 def test_an_invariant_terminal_set_always_leaves_a_plan(setting: Settings) -> None:
-    world = run(setting, holds("The largest safe set"))
+    world = run(setting, hold_time("The largest safe set"))
     found = readouts(world)
     assert found["failures"] == 0.0
     assert found["share"] == pytest.approx(100.0, abs=1e-3)
@@ -134,7 +134,7 @@ def test_the_admissible_set_is_found_step_by_step(setting: Settings) -> None:
 
 @verify("The price of safety")
 def test_a_small_terminal_set_shrinks_what_is_feasible(setting: Settings) -> None:
-    world = run(setting, holds("The price of safety"))
+    world = run(setting, hold_time("The price of safety"))
     assert readouts(world)["failed"] == 0.0
     assert readouts(world)["share"] == pytest.approx(23.5, abs=0.05)
     assert readouts(run({**setting, "horizon": 20.0}, 8.0))["failures"] == 0.0
@@ -144,7 +144,7 @@ def test_a_small_terminal_set_shrinks_what_is_feasible(setting: Settings) -> Non
 
 @verify("Too weak to hold")
 def test_zero_velocity_is_safe_only_for_a_joint_that_holds_itself(setting: Settings) -> None:
-    world = run(setting, holds("Too weak to hold"))
+    world = run(setting, hold_time("Too weak to hold"))
     found = readouts(world)
     assert found["failed"] == 2.0
     assert found["leak"] > 5.0
@@ -169,7 +169,7 @@ def test_a_pendulum_that_cannot_be_kept_has_plans_at_first(setting: Settings) ->
     x = state(world).z
     assert x == pytest.approx([0.1, 1.8])
     assert readouts(world)["depth_feasible"] > 0.0 > readouts(world)["depth_invariant"]
-    found = readouts(run(setting, holds("Nothing but unstable")))
+    found = readouts(run(setting, hold_time("Nothing but unstable")))
     assert found["failed"] == 3.0
     assert "impact" in found
     told = run({**setting, "terminal": "admissible"}, 0.1)
@@ -189,9 +189,9 @@ def test_blocks_leave_fewer_controls_and_plans() -> None:
     assert four["share"] == pytest.approx(91.0, abs=0.5)
     assert min(two["leak"], four["leak"]) > 2.0
     world, whole = run(blocks, 1.0), run({**blocks, "block": "1"}, 1.0)
-    assert state(world).failed == 1
+    assert state(world).first_failed_period == 1
     assert state(whole).failures == 0
-    notes = find("mpc-feasibility").lab.notes
+    notes = find_lab("mpc-feasibility").lab.notes
     assert "The terminal set is control invariant" in notes(world.params, world.state)["planner"]
 
 
@@ -205,9 +205,9 @@ def test_red_is_what_no_run_should_enter() -> None:
     rng = np.random.default_rng(2)
     for terminal in ("invariant", "admissible"):
         params = MpcFeasibilityParams(u_max=0.5, terminal=terminal, horizon=6.0)
-        sets = sets_of(params.setup)
+        sets = compute_sets(params.setup)
         assert sets.rows is not None
-        assert not sets.doomed
+        assert not sets.infeasible_regions
         for x1, x2 in rng.uniform(-1.0, 1.0, (12, 2)).round(2):
             start = {"x1": float(x1), "x2": float(x2)}
             other = run({"u_max": 0.5, "terminal": terminal, "horizon": 6.0, **start}, 3.0)

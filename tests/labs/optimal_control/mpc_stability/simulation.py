@@ -32,6 +32,6 @@ def simulate(setting: Settings, seconds: float) -> Outcome:
     return Outcome(world, readouts(world), notes, world.state.run)
 
 
-def rises(outcome: Outcome) -> np.ndarray:
+def value_changes(outcome: Outcome) -> np.ndarray:
     """V*(x+) - V*(x) of every period."""
     return np.diff(outcome.run.V)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from labs.optimal_control.mpc_stability.params import MpcStabilityParams
-from tests.labs.experiments import Experiments
-from tests.labs.optimal_control.mpc_stability.simulation import Settings, rises, simulate
+from tests.labs.experiments import ArticleExperiments
+from tests.labs.optimal_control.mpc_stability.simulation import Settings, simulate, value_changes
 
-EXPERIMENTS = Experiments("labs.optimal_control", "mpc_stability")
+EXPERIMENTS = ArticleExperiments("labs.optimal_control", "mpc_stability")
 verify = EXPERIMENTS.verify
 HOLDS, FAILS = "✓", "✗"
 
@@ -17,7 +17,7 @@ def test_optimal_plans_that_fall(setting: Settings) -> None:
     found = simulate(setting, 3.6)
     assert found.notes["run"] == "37 plans, each solved to optimality."
     assert found.run.V[0] == pytest.approx(0.01, abs=5e-4)
-    assert (rises(found) > 0.0).all()
+    assert (value_changes(found) > 0.0).all()
     assert EXPERIMENTS.answer("Optimal, and it falls") == "It rises."
     assert "After 3.70 s it is far out" in simulate(setting, 3.8).notes["run"]
     assert found.tiles["rises"] > 50.0
@@ -26,17 +26,17 @@ def test_optimal_plans_that_fall(setting: Settings) -> None:
 
 @verify("Look farther")
 def test_the_least_horizon(setting: Settings) -> None:
-    least = next(N for N in range(1, 20) if stands({**setting, "N": float(N)}))
+    least = next(N for N in range(1, 20) if keeps_running({**setting, "N": float(N)}))
     assert least == EXPERIMENTS.answer("Look farther") == setting["N"]
     found = simulate(setting, 3.0)
-    assert (rises(found) < 0.0).all()
-    assert (found.run.excess > 0.0).all(), "by less than l"
+    assert (value_changes(found) < 0.0).all()
+    assert (found.run.decrease_excess > 0.0).all(), "by less than l"
     assert found.tiles["falls"] < 1.0
-    assert not stands({**setting, "r": 10.0})
+    assert not keeps_running({**setting, "r": 10.0})
 
 
-def stands(setting: Settings) -> bool:
-    return not simulate(setting, 5.0).run.ended
+def keeps_running(setting: Settings) -> bool:
+    return not simulate(setting, 5.0).run.end_reason
 
 
 @verify("The tail as a price")
@@ -49,8 +49,8 @@ def test_riccatis_price_makes_one_step_enough(setting: Settings) -> None:
     longer = simulate({**setting, "N": 10.0}, 5.0)
     np.testing.assert_allclose(longer.run.path, found.run.path, atol=1e-9)
     assert found.tiles["rises"] > 40.0
-    assert not stands({**setting, "q0": 0.42})
-    assert stands({**setting, "q0": 0.4})
+    assert not keeps_running({**setting, "q0": 0.42})
+    assert keeps_running({**setting, "q0": 0.4})
 
 
 @verify("Where the promise holds")
@@ -59,7 +59,7 @@ def test_the_promise_holds_on_all_of_the_feasible_states(setting: Settings) -> N
     assert found.tiles["falls"] == pytest.approx(100.0)
     assert found.notes["assumptions"].count(HOLDS) == 4
     assert "All hold" in found.notes["assumptions"]
-    assert found.run.excess.max() < 1e-9
+    assert found.run.decrease_excess.max() < 1e-9
 
 
 @verify("Only the origin")
@@ -89,8 +89,8 @@ def test_a_lazy_gain_keeps_the_promise_on_a_larger_set(setting: Settings) -> Non
 @verify("Follow a motion")
 def test_a_motion_is_followed_without_error(setting: Settings) -> None:
     found = simulate(setting, 10.0)
-    assert found.run.excess.max() < 1e-9
-    assert (rises(found)[:20] < 0.0).all()
+    assert found.run.decrease_excess.max() < 1e-9
+    assert (value_changes(found)[:20] < 0.0).all()
     assert found.run.V[-1] < 1e-6
     assert found.tiles["q"] == pytest.approx(found.tiles["q_ref"], abs=1e-3)
     assert found.tiles["terminal_area"] == pytest.approx(0.46, abs=5e-3)
@@ -102,7 +102,7 @@ def test_a_motion_is_followed_without_error(setting: Settings) -> None:
 def test_an_economic_cost_has_no_lyapunov_function(setting: Settings) -> None:
     found = simulate(setting, 15.0)
     assert EXPERIMENTS.answer("A cost that is no distance") == "It rests, and V* rises."
-    assert (rises(found)[:22] > 0.0).all()
+    assert (value_changes(found)[:22] > 0.0).all()
     assert found.run.V[0] == pytest.approx(-7.5, abs=0.05)
     assert found.run.V[22] == pytest.approx(-4.5, abs=0.05)
     assert found.run.x[0] == pytest.approx(0.13, abs=5e-3)

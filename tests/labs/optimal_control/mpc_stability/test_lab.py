@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from labs.algorithms.polygons import vertices
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
-from labs.optimal_control.mpc_stability.assumptions import check
+from labs.optimal_control.mpc_stability.assumptions import check_assumptions
 from labs.optimal_control.mpc_stability.formulation import Formulation
 from labs.optimal_control.mpc_stability.params import MpcStabilityParams
 from labs.optimal_control.mpc_stability.reference import Reference
@@ -76,25 +76,27 @@ def test_the_worst_of_the_terminal_set_is_that_of_brute_force() -> None:
     change = ((after @ p.Q_f) * after).sum(-1) - ((X @ p.Q_f) * X).sum(-1)
     change += ((X @ p.Q) * X).sum(-1) + (U * U * p.R[0, 0]).sum(-1)
     best = np.where(p.terminal_set.contains(after, 1e-9), change / 2.0, np.inf).min(axis=1)
-    assert check(given).decrease == pytest.approx(best[np.isfinite(best)].max(), rel=0.03)
+    assert check_assumptions(given).decrease == pytest.approx(
+        best[np.isfinite(best)].max(), rel=0.03
+    )
 
 
 def test_a_lazier_gain_costs_more() -> None:
     """So that its P bounds Riccati's from above, and stabilises."""
     P, riccati = (formulation(rho=rho).problem.Q_f for rho in (7.0, 1.0))
     assert (np.linalg.eigvalsh(P - riccati) > -1e-9).all()
-    assert check(formulation(rho=7.0)).terminal_bound == pytest.approx(
+    assert check_assumptions(formulation(rho=7.0)).terminal_bound == pytest.approx(
         np.linalg.eigvalsh(P)[-1] / 2
     )
 
 
 def test_what_holds_is_told_apart() -> None:
-    assert check(formulation()).hold == (True, True, True, True)
-    assert check(formulation(terminal_set="none")).hold == (True, False, False, True)
-    assert check(formulation(q_v=0.0)).hold[3] is False
-    assert check(formulation(terminal_cost="none")).hold == (True, True, False, True)
-    assert check(formulation(terminal_cost="none", terminal_set="origin")).hold[2]
-    assert check(formulation(task="economic", price=0.5)).hold[3] is False
+    assert check_assumptions(formulation()).hold == (True, True, True, True)
+    assert check_assumptions(formulation(terminal_set="none")).hold == (True, False, False, True)
+    assert check_assumptions(formulation(q_v=0.0)).hold[3] is False
+    assert check_assumptions(formulation(terminal_cost="none")).hold == (True, True, False, True)
+    assert check_assumptions(formulation(terminal_cost="none", terminal_set="origin")).hold[2]
+    assert check_assumptions(formulation(task="economic", price=0.5)).hold[3] is False
 
 
 def test_a_motion_beyond_the_limits_says_so() -> None:
@@ -105,7 +107,7 @@ def test_a_motion_beyond_the_limits_says_so() -> None:
 
 
 def test_another_start_or_problem_begins_another_run() -> None:
-    world = World(find("mpc-stability"))
+    world = World(find_lab("mpc-stability"))
     for _ in range(30):
         world.advance()
     assert world.state.run.k == 3

@@ -15,11 +15,15 @@ from labs.optimal_control.mpc_uncertainty.controllers import (
 )
 from labs.optimal_control.mpc_uncertainty.lab import UncertaintyState
 from labs.optimal_control.mpc_uncertainty.params import UncertaintyParams
-from labs.optimal_control.mpc_uncertainty.statistics import HELD, Counts, promised_interval
-from tests.labs.experiments import Experiments
-from tests.labs.solving import Settings, done, readouts, solved_world
+from labs.optimal_control.mpc_uncertainty.statistics import (
+    ARRIVAL_STEP,
+    Counts,
+    confidence_interval,
+)
+from tests.labs.experiments import ArticleExperiments
+from tests.labs.solving import Settings, readouts, solved_world, stop_reason
 
-EXPERIMENTS = Experiments("labs.optimal_control", "mpc_uncertainty")
+EXPERIMENTS = ArticleExperiments("labs.optimal_control", "mpc_uncertainty")
 verify = EXPERIMENTS.verify
 
 
@@ -46,7 +50,7 @@ def counts(setting: Settings) -> Counts:
 def closest(setting: Settings, controller: int) -> float:
     """[m] how far from the wall the farthest run stays, once arrived; negative behind it."""
     wall = float(setting.get("wall", UncertaintyParams().wall))
-    return float(wall - state(setting).runs.X[controller, HELD:, :, 0].max())
+    return float(wall - state(setting).runs.X[controller, ARRIVAL_STEP:, :, 0].max())
 
 
 @verify("A hundred carts")
@@ -97,7 +101,7 @@ def test_large_disturbances_leave_nothing(setting: Settings) -> None:
     assert 2.0 - design.problems[ROBUST].control_set.h[0] == pytest.approx(2.03, abs=0.005)
     assert list(counts(setting).unplanned[[STOCHASTIC, ROBUST]]) == [0.0, 1.0]
     world = solved(setting)
-    assert "Robust MPC finds no plan" in done(world)
+    assert "Robust MPC finds no plan" in stop_reason(world)
     assert "nothing is left of U" in world.lab.notes(world.params, world.state)["promise"]
     assert len(controllers(UncertaintyParams(w_v=0.2)).feasible[ROBUST]) > 2
     assert EXPERIMENTS.answer("So careful that nothing is left") == "From nowhere."
@@ -109,7 +113,7 @@ def test_each_step_keeps_its_promise_and_all_of_them_do_not(setting: Settings) -
     assert found.ever[STOCHASTIC] == 0.65
     assert found.held[STOCHASTIC] == pytest.approx(0.095, abs=5e-4)
     assert found.beyond[STOCHASTIC, -1] == 0.09
-    assert promised_interval(UncertaintyParams()) == (0.05, 0.16)
+    assert confidence_interval(UncertaintyParams()) == (0.05, 0.16)
     assert found.cost[STOCHASTIC] == pytest.approx(135.6, abs=0.05)
     quantiles = norm.ppf([0.5, 0.9, 0.999])
     assert quantiles == pytest.approx([0.0, 1.28, 3.09], abs=0.005)

@@ -4,21 +4,21 @@ import numpy as np
 import pytest
 
 from labs.algorithms.linear_mpc import LinearPlanner, OptimalValues
-from labs.algorithms.tube_mpc import TubePlanner, Tubes
-from labs.engine.catalog import find
+from labs.algorithms.tube_mpc import TubePlanner, TubeValues
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.optimal_control.mpc_uncertainty.controllers import (
-    NAMES,
+    CONTROLLER_NAMES,
     NOMINAL,
     ROBUST,
     STOCHASTIC,
     controllers,
 )
-from labs.optimal_control.mpc_uncertainty.disturbances import AIM, disturbances
-from labs.optimal_control.mpc_uncertainty.lab import REST, TICKS, UncertaintyState
-from labs.optimal_control.mpc_uncertainty.params import KINDS, UncertaintyParams
-from labs.optimal_control.mpc_uncertainty.picture import CIRCLE, phase_plane
-from labs.optimal_control.mpc_uncertainty.runs import STEPS
+from labs.optimal_control.mpc_uncertainty.disturbances import WORST_CASE_STEPS, sample_disturbances
+from labs.optimal_control.mpc_uncertainty.lab import REST_TICKS, TICKS_PER_STEP, UncertaintyState
+from labs.optimal_control.mpc_uncertainty.params import DISTURBANCE_KINDS, UncertaintyParams
+from labs.optimal_control.mpc_uncertainty.picture import UNIT_CIRCLE, phase_plane
+from labs.optimal_control.mpc_uncertainty.runs import RUN_STEPS
 from labs.problems.polyhedron import box
 from labs.resumable import Resumable, run_to_completion
 from labs.scene import NullScene
@@ -43,20 +43,20 @@ def test_all_controllers_meet_the_same_disturbances_and_limits_of_the_motor() ->
     assert (np.abs(runs.U) <= params.u_max).all()
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", DISTURBANCE_KINDS)
 def test_disturbances_are_of_their_kind(kind: str) -> None:
     params = UncertaintyParams(kind=kind, count=400.0, width=2.0)
     A_K = np.array([[0.9, 0.16], [-0.8, 0.4]])
-    w = disturbances(params, A_K, STEPS) / params.w_max
-    np.testing.assert_array_equal(w * params.w_max, disturbances(params, A_K, STEPS))
+    w = sample_disturbances(params, A_K, RUN_STEPS) / params.w_max
+    np.testing.assert_array_equal(w * params.w_max, sample_disturbances(params, A_K, RUN_STEPS))
     if kind == "gaussian":
         np.testing.assert_allclose(w.std(axis=(0, 1)), 0.5, rtol=0.02)
         assert np.abs(w).max() > 1.0
         return
     assert np.abs(w).max() <= 1.0
     if kind == "worst":
-        powers = [np.linalg.matrix_power(A_K, i)[0] for i in range(AIM)]
-        reached = sum(powers[AIM - 1 - k] @ w[k, 0] for k in range(AIM))
+        powers = [np.linalg.matrix_power(A_K, i)[0] for i in range(WORST_CASE_STEPS)]
+        reached = sum(powers[WORST_CASE_STEPS - 1 - k] @ w[k, 0] for k in range(WORST_CASE_STEPS))
         assert reached == pytest.approx(np.abs(powers).sum()), "as far as W can lead"
         return
     deviations = UncertaintyParams(kind=kind).deviation / params.w_max
@@ -68,8 +68,8 @@ def test_feasible_sets_hold_just_the_states_from_which_there_are_plans(source: s
     chosen = controllers(UncertaintyParams(source=source, N=6.0))
     states = phase_plane(UncertaintyParams()).grid(15, 19).reshape(-1, 2)
     planners: list[LinearPlanner | TubePlanner] = [*chosen.planners, chosen.tube_planner]
-    for name, corners, planner in zip(NAMES, chosen.feasible, planners, strict=True):
-        answers: Resumable[OptimalValues | Tubes] = planner.values(states)
+    for name, corners, planner in zip(CONTROLLER_NAMES, chosen.feasible, planners, strict=True):
+        answers: Resumable[OptimalValues | TubeValues] = planner.values(states)
         found = np.isfinite(run_to_completion(answers).V)
         edges = np.roll(corners, -1, axis=0) - corners
         away = states[:, None] - corners
@@ -88,7 +88,7 @@ def test_what_is_drawn_about_a_plan_reaches_as_far_as_its_margins(source: str) -
     np.testing.assert_allclose(reach, margins[STOCHASTIC], atol=1e-6)
     np.testing.assert_allclose(chosen.tube[:, 0].max(), margins[ROBUST])
     assert not margins[NOMINAL].any()
-    assert (CIRCLE**2).sum(axis=1) == pytest.approx(1.0)
+    assert (UNIT_CIRCLE**2).sum(axis=1) == pytest.approx(1.0)
 
 
 def test_robust_mpc_keeps_every_limit() -> None:
@@ -101,22 +101,22 @@ def test_robust_mpc_keeps_every_limit() -> None:
 
 
 def test_the_runs_are_played_and_begin_anew() -> None:
-    world = World(find(SLUG), {"count": 20.0})
+    world = World(find_lab(SLUG), {"count": 20.0})
     solve(world)
     assert state(world).clock == 0
-    for _ in range(STEPS * TICKS):
+    for _ in range(RUN_STEPS * TICKS_PER_STEP):
         world.advance()
-    assert state(world).clock == STEPS * TICKS
-    for _ in range(REST + 1):
+    assert state(world).clock == RUN_STEPS * TICKS_PER_STEP
+    for _ in range(REST_TICKS + 1):
         world.advance()
     assert state(world).clock == 0
     world.change({"w_v": 0.12})
     solve(world)
-    assert state(world).runs.steps == STEPS
+    assert state(world).runs.steps == RUN_STEPS
 
 
 def test_the_start_is_dragged_in_the_plane() -> None:
-    world = World(find(SLUG), {})
+    world = World(find_lab(SLUG), {})
     lab, params = world.lab, world.params
     assert isinstance(params, UncertaintyParams)
     point = phase_plane(params).place(np.array([-0.4, 0.3]))
@@ -125,13 +125,13 @@ def test_the_start_is_dragged_in_the_plane() -> None:
 
 
 def test_each_controller_is_shown_alone_or_beside_the_others() -> None:
-    for shown in ("all", *NAMES):
+    for shown in ("all", *CONTROLLER_NAMES):
         world = solved_world(SLUG, {"count": 20.0, "shown": shown})
         scene = NullScene()
         world.lab.draw(scene, world.params, world.state)
-        seen = {name for name in NAMES if f"runs, {name}" in scene.names}
-        assert seen == (set(NAMES) if shown == "all" else {shown})
-        assert {f"{name} cart" for name in NAMES} <= set(scene.names)
+        seen = {name for name in CONTROLLER_NAMES if f"runs, {name}" in scene.names}
+        assert seen == (set(CONTROLLER_NAMES) if shown == "all" else {shown})
+        assert {f"{name} cart" for name in CONTROLLER_NAMES} <= set(scene.names)
         assert "start" in scene.names
     world.change({"zoom": True})
     near = NullScene()

@@ -3,20 +3,20 @@
 import numpy as np
 import pytest
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.optimal_control.multiple_shooting.lab import MultipleShootingState
 from labs.params import Value
-from tests.labs.experiments import Experiments
-from tests.labs.solving import Settings, done, solved_world
+from tests.labs.experiments import ArticleExperiments
+from tests.labs.solving import Settings, solved_world, stop_reason
 
-EXPERIMENTS = Experiments("labs.optimal_control", "multiple_shooting")
+EXPERIMENTS = ArticleExperiments("labs.optimal_control", "multiple_shooting")
 verify = EXPERIMENTS.verify
 
 
 def begun(setting: Settings, **more: Value) -> tuple[World, MultipleShootingState]:
     """At the first guess."""
-    world = World(find("multiple-shooting"), {**setting, **more})
+    world = World(find_lab("multiple-shooting"), {**setting, **more})
     assert isinstance(world.state, MultipleShootingState)
     return world, world.state
 
@@ -25,7 +25,7 @@ def solved(setting: Settings, **more: Value) -> tuple[MultipleShootingState, str
     """At the end of the solver, and its last sentence."""
     world = solved_world("multiple-shooting", {**setting, **more})
     assert isinstance(world.state, MultipleShootingState)
-    return world.state, done(world)
+    return world.state, stop_reason(world)
 
 
 def cost(state: MultipleShootingState) -> float:

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.optimal_control.multiple_shooting.lab import MultipleShootingState
 from labs.params import Value
 from labs.scene import NullScene
 from labs.tasks.motion.playback import FEEDBACK
-from tests.labs.solving import done, solve
+from tests.labs.solving import solve, stop_reason
 
 
 def world_of(**setting: Value) -> World:
-    return World(find("multiple-shooting"), setting)
+    return World(find_lab("multiple-shooting"), setting)
 
 
 def state(world: World) -> MultipleShootingState:
@@ -31,7 +31,7 @@ def test_arcs_are_drawn_apart_until_they_join() -> None:
     world = world_of(segments=7.0)
     assert [f"gap {i}" in drawn(world) for i in range(1, 8)] == [True] * 6 + [False]
     solve(world)
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
     names = drawn(world)
     assert not [name for name in names if name.startswith("gap")]
     assert {f"segment {i}" for i in range(1, 8)} | {f"start {i}" for i in range(1, 8)} < set(names)
@@ -48,9 +48,9 @@ def test_segments_are_at_most_as_many_as_pieces() -> None:
 def test_the_plan_is_played_to_its_goal() -> None:
     world = world_of()
     solve(world)
-    while not len(state(world).missed):
+    while not len(state(world).goal_errors):
         world.advance()
-    assert state(world).missed[FEEDBACK] < 1e-4
+    assert state(world).goal_errors[FEEDBACK] < 1e-4
 
 
 def test_a_change_starts_warm() -> None:
@@ -58,7 +58,7 @@ def test_a_change_starts_warm() -> None:
     solve(world)
     world.change({"segments": 20.0})
     solve(world)
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
     assert state(world).history.iterations <= 3
     assert state(world).history.gaps[0].max() < 0.5, "from the motion it had"
 
@@ -68,7 +68,7 @@ def test_a_reach_goes_to_the_dragged_target_around_the_ball() -> None:
     target = (0.45, -0.25, 0.3)
     world.change(world.lab.edit(world.params, "target", target))
     solve(world)
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
     at = state(world)
     tips = at.history.tips[-1].reshape(-1, 3)
     np.testing.assert_allclose(tips[-1], target, atol=1e-3)
@@ -80,13 +80,13 @@ def test_a_reach_goes_to_the_dragged_target_around_the_ball() -> None:
 def test_an_infeasible_limit_says_so_and_the_next_change_recovers() -> None:
     world = world_of(limited=True, limit=0.2)
     solve(world)
-    assert done(world).startswith("Infeasible")
+    assert stop_reason(world).startswith("Infeasible")
     assert state(world).failed
     world.change({"limited": False})
     solve(world)
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
     fresh = world_of()
     solve(fresh)
-    assert done(world) == done(fresh), "from the first guess, not from what failed"
+    assert stop_reason(world) == stop_reason(fresh), "from the first guess, not from what failed"
     assert not state(world).failed
     assert state(world).history.gaps[-1].max() == pytest.approx(0.0, abs=1e-7)

@@ -8,10 +8,10 @@ from labs.engine.run import World
 from labs.optimal_control.single_shooting.lab import SingleShootingState
 from labs.optimal_control.single_shooting.params import SingleShootingParams
 from tests.labs.solving import Settings as Settings
-from tests.labs.solving import done as done
 from tests.labs.solving import readouts as readouts
 from tests.labs.solving import solve as solve
 from tests.labs.solving import solved_world
+from tests.labs.solving import stop_reason as stop_reason
 
 
 def solved(setting: Settings) -> World:

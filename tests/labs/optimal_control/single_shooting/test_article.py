@@ -5,26 +5,26 @@ import pytest
 
 from labs.models.mechanisms import mechanism
 from labs.resumable import run_to_completion
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 from tests.labs.optimal_control.single_shooting.simulation import (
     Settings,
-    done,
     fields,
     params,
     readouts,
     solve,
     solved,
     state,
+    stop_reason,
 )
 
-EXPERIMENTS = Experiments("labs.optimal_control", "single_shooting")
+EXPERIMENTS = ArticleExperiments("labs.optimal_control", "single_shooting")
 verify = EXPERIMENTS.verify
 
 
 @verify("Change one control")
 def test_the_first_control_swings_the_end_about(setting: Settings) -> None:
     world = solved(setting)
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
     plan = state(world).plan
     assert plan.N == 20
     assert pytest.approx(0.1) == plan.T / plan.N
@@ -76,10 +76,10 @@ def test_two_seconds_of_balance_are_too_much(setting: Settings) -> None:
     assert counts[0] == pytest.approx(10, abs=3)
     assert counts[1] > 2 * counts[0]
     for world, condition in ((one, 2300), (more, 28_000)):
-        assert done(world).startswith("Converged")
+        assert stop_reason(world).startswith("Converged")
         assert readouts(world)["condition"] == pytest.approx(condition, rel=0.02)
     assert state(two).failed
-    assert not done(two).startswith("Converged")
+    assert not stop_reason(two).startswith("Converged")
     assert state(two).history.violation[-1] > 1.0, "nowhere near"
     assert EXPERIMENTS.answer("One second more") == "However many: it does not find it."
 
@@ -125,7 +125,7 @@ def test_differences_simulate_once_for_each_variable_and_once_more(
 @verify("A plan for another pendulum")
 def test_eulers_pendulum_is_another_one(setting: Settings) -> None:
     world = solved(setting)
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
     assert state(world).history.violation[-1] < 1e-8
     shown = readouts(world)
     assert shown["missed"] == pytest.approx(3.7, abs=0.05)
@@ -145,7 +145,7 @@ def test_eulers_pendulum_is_another_one(setting: Settings) -> None:
 @verify("Twice the steps")
 def test_errors_fall_by_the_order(setting: Settings) -> None:
     world = solved(setting)
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
     study = state(world).study
     euler, midpoint, rk4 = (study.state_errors[:-1] / study.state_errors[1:]).T
     assert euler[-1] == pytest.approx(2, abs=0.1)

@@ -3,23 +3,23 @@
 import numpy as np
 import pytest
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.optimal_control.single_shooting.lab import SingleShootingLab
 from labs.optimal_control.single_shooting.params import SingleShootingParams
-from labs.optimal_control.single_shooting.picture import STRIPS
-from labs.optimal_control.single_shooting.plan import held_where_diverged, state_at
+from labs.optimal_control.single_shooting.picture import STRIP_POSITIONS
+from labs.optimal_control.single_shooting.plan import hold_after_divergence, interpolate_state
 from labs.scene import NullScene
 from labs.tasks.motion.player import REST_STEPS
 from tests.labs.optimal_control.single_shooting.simulation import (
     Settings,
-    done,
     fields,
     params,
     readouts,
     solve,
     solved,
     state,
+    stop_reason,
 )
 
 # The solver's clock ---------------------------------------------------------------------------
@@ -37,21 +37,21 @@ def test_looking_back_shows_that_iteration() -> None:
 
 def test_a_solve_that_stops_short_goes_on_warm() -> None:
     world = solved({"iterations": 5.0})
-    assert done(world).startswith("Stopped short after 5 iterations")
+    assert stop_reason(world).startswith("Stopped short after 5 iterations")
     assert state(world).failed
     cost = state(world).history.cost[-1]
     world.change({"iterations": 100.0})
     solve(world)
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
     assert state(world).history.cost[0] == pytest.approx(cost, rel=1e-12)
 
 
 def test_a_solve_that_failed_is_begun_anew() -> None:
     world = solved({"limited": True, "limit": 0.2})
-    assert done(world).startswith("Infeasible")
+    assert stop_reason(world).startswith("Infeasible")
     world.change({"limited": False})
     solve(world)
-    assert done(world) == done(solved({}))
+    assert stop_reason(world) == stop_reason(solved({}))
 
 
 @pytest.mark.parametrize("objective", ["least-time", "least-energy", "fastest-end"])
@@ -59,10 +59,10 @@ def test_a_solve_that_failed_is_begun_anew() -> None:
 def test_a_system_that_is_chosen_brings_a_horizon_and_a_guess_that_work(
     system: str, objective: str
 ) -> None:
-    world = World(find("single-shooting"), {"objective": objective})
+    world = World(find_lab("single-shooting"), {"objective": objective})
     world.change({"system": system})
     solve(world)
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
     world.change({"system": "mass"})
     assert world.params == SingleShootingParams(system="mass", objective=objective)
     world.change({"system": system, "horizon": 3.0})
@@ -75,7 +75,7 @@ def test_a_warm_start_fits_another_problem(changes: Settings) -> None:
     before = state(world)
     world.change(changes)
     solve(world)
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
     assert state(world).plan.N == params(world).N
     if "limited" in changes:
         assert state(world).history.cost[0] == pytest.approx(before.history.cost[-1], rel=1e-9)
@@ -87,7 +87,7 @@ def test_a_diverging_guess_keeps_the_plan_and_says_where() -> None:
     plan = state(world).plan
     world.change({"start": "cold", "guess": 1.0})
     solve(world)
-    assert done(world).startswith("The first guess diverges in step ")
+    assert stop_reason(world).startswith("The first guess diverges in step ")
     assert state(world).plan is plan
     assert state(world).failed
     world.advance()
@@ -97,14 +97,14 @@ def test_a_diverging_guess_keeps_the_plan_and_says_where() -> None:
 @pytest.mark.parametrize("preset", ["Cart-pole", "Double pendulum"])
 def test_the_larger_swing_ups_arrive(preset: str) -> None:
     world = solved(SingleShootingLab.presets[preset])
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
     assert readouts(world)["missed"] < 0.1
 
 
 @pytest.mark.parametrize("changes", [{}, {"obstacle": True}, {"objective": "least-time"}])
 def test_the_ur5_reaches_where_its_target_is_dragged(changes: Settings) -> None:
     world = solved({**SingleShootingLab.presets["UR5 reach"], **changes})
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
     assert readouts(world)["missed"] < 1e-3
     scene = NullScene()
     world.lab.draw(scene, world.params, world.state)
@@ -113,7 +113,7 @@ def test_the_ur5_reaches_where_its_target_is_dragged(changes: Settings) -> None:
     assert np.isfinite(fields(world)["changed"]).all()
     world.change(world.lab.edit(world.params, "target", (0.35, -0.25, 0.3)))
     solve(world)
-    assert done(world).startswith("Converged")
+    assert stop_reason(world).startswith("Converged")
     assert readouts(world)["missed"] < 1e-3
 
 
@@ -126,7 +126,7 @@ def test_the_motion_is_played_rests_and_starts_over() -> None:
     for _ in range(25):
         world.advance()
     q = world.lab.measure(world.params, world.state)["q"]
-    np.testing.assert_allclose(q, state_at(state(world).plan.simulated, T, 0.25)[:1])
+    np.testing.assert_allclose(q, interpolate_state(state(world).plan.simulated, T, 0.25)[:1])
     for _ in range(25 + REST_STEPS):
         world.advance()
     at_rest = world.lab.measure(world.params, world.state)["q"]
@@ -173,7 +173,7 @@ def test_the_ball_chooses_a_control_and_its_change() -> None:
     world.lab.draw(scene, world.params, world.state)
     assert {"robot", "ghost", "plan", "changed", "fan 1", "control"} <= set(scene.names)
     lab, at = SingleShootingLab(), SingleShootingParams()
-    _, y, z = STRIPS[at.task.motion]
+    _, y, z = STRIP_POSITIONS[at.task.motion]
     assert lab.edit(at, "control", (0.0, y + 0.01, z + 0.12)) == {"piece": 1.0, "delta": 1.0}
     assert lab.edit(at, "control", (0.0, y + 0.79, z - 0.06)) == {"piece": 20.0, "delta": -0.5}
     assert lab.edit(at, "control", (0.0, 9.0, 9.0)) == {"piece": 20.0, "delta": 2.0}
@@ -201,5 +201,5 @@ def test_without_a_change_the_iterations_before_are_drawn() -> None:
 
 def test_what_diverges_rests_where_it_was_last() -> None:
     X = np.array([[0.0, 1.0], [2.0, 3.0], [np.inf, 0.0], [np.nan, np.nan]])
-    np.testing.assert_array_equal(held_where_diverged(X), X[[0, 1, 1, 1]])
-    np.testing.assert_array_equal(held_where_diverged(X[:2]), X[:2])
+    np.testing.assert_array_equal(hold_after_divergence(X), X[[0, 1, 1, 1]])
+    np.testing.assert_array_equal(hold_after_divergence(X[:2]), X[:2])

@@ -14,10 +14,10 @@ from labs.reactive_control.differential_kinematics.lab import (
 )
 from labs.reactive_control.differential_kinematics.params import DifferentialParams
 from labs.scene import Color, NullScene
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 
 LAB = DifferentialKinematics()
-ARTICLE = Experiments("labs.reactive_control", "differential_kinematics")
+ARTICLE = ArticleExperiments("labs.reactive_control", "differential_kinematics")
 
 
 def parameters(setting: Mapping[str, Value], **changes: Value) -> DifferentialParams:

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from labs.algorithms.inverse_kinematics import INVERSE_KINEMATICS_METHODS
 from labs.algorithms.jacobian import ForwardKinematics
 from labs.lab import Inputs
-from labs.models.arms import load
+from labs.models.arms import load_arm
 from labs.params import Value
 from tests.labs.reactive_control.differential_kinematics.runs import (
     ARTICLE,
@@ -30,7 +30,7 @@ from tests.labs.reactive_control.differential_kinematics.runs import (
 @ARTICLE.verify("A lever from the base")
 def test_only_the_horizontal_part_of_the_lever_counts(setting: Mapping[str, Value]) -> None:
     assert parameters(setting).rates.tolist() == [0.5, 0, 0, 0, 0, 0]
-    arm = load("ur5")
+    arm = load_arm("ur5")
     chain = ForwardKinematics(arm.model, arm.tip).at(arm.home)
     lever = chain.placement.translation - chain.points[0]
     assert np.linalg.norm(lever) == pytest.approx(0.61, abs=0.005)

@@ -7,8 +7,8 @@ from labs.params import Value
 from labs.reactive_control.differential_kinematics.lab import SINGULARITY_WARNING
 from labs.reactive_control.differential_kinematics.picture import (
     COLUMN,
-    FORCE_BALL,
-    VELOCITY_BALL,
+    FORCE_ELLIPSOID_SCALE,
+    VELOCITY_ELLIPSOID_SCALE,
 )
 from tests.labs.reactive_control.differential_kinematics.runs import (
     LAB,
@@ -39,10 +39,10 @@ def test_ellipsoids_hold_all_velocities_and_forces_of_unit_effort() -> None:
     rng = np.random.default_rng(4)
     for _ in range(100):
         rates = rng.normal(size=6)
-        velocity = VELOCITY_BALL * linear @ (rates / np.linalg.norm(rates))
+        velocity = VELOCITY_ELLIPSOID_SCALE * linear @ (rates / np.linalg.norm(rates))
         assert np.linalg.norm(np.linalg.solve(drawn.axes["velocities"], velocity)) <= 1 + 1e-12
         force = rng.normal(size=3)
-        force *= FORCE_BALL / np.linalg.norm(linear.T @ force)
+        force *= FORCE_ELLIPSOID_SCALE / np.linalg.norm(linear.T @ force)
         on = np.linalg.norm(np.linalg.solve(drawn.axes["forces"], force))
         assert on == pytest.approx(1.0, rel=1e-12)
 

@@ -16,10 +16,10 @@ from labs.reactive_control.dynamics.lab import SPEED_LIMIT, ArmDynamics, Dynamic
 from labs.reactive_control.dynamics.params import DynamicsParams
 from labs.scene import NullScene
 from labs.tasks.arm.postures import POSED_ARMS
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 
 LAB = ArmDynamics()
-ARTICLE = Experiments("labs.reactive_control", "dynamics")
+ARTICLE = ArticleExperiments("labs.reactive_control", "dynamics")
 FALL: Mapping[str, Value] = {
     "robot": "double-pendulum",
     "drive": "none",
@@ -27,7 +27,7 @@ FALL: Mapping[str, Value] = {
 }
 
 
-def with_(setting: Mapping[str, Value], **changes: Value) -> DynamicsParams:
+def make_params(setting: Mapping[str, Value], **changes: Value) -> DynamicsParams:
     return DynamicsParams().change({**setting, **changes})
 
 
@@ -55,7 +55,7 @@ def rows(params: DynamicsParams, seconds: float) -> dict[str, np.ndarray]:
 
 def at_start(setting: Mapping[str, Value], **changes: Value) -> dict[str, np.ndarray]:
     """All that is measured and pictured at t = 0."""
-    params = with_(setting, **changes)
+    params = make_params(setting, **changes)
     state = LAB.init(params, np.random.default_rng(0))
     found: dict[str, Any] = {**LAB.measure(params, state), **LAB.fields(params, state)}
     return found
@@ -66,7 +66,7 @@ def at_start(setting: Mapping[str, Value], **changes: Value) -> dict[str, np.nda
 
 @ARTICLE.verify("There and back")
 def test_there_and_back(setting: Mapping[str, Value]) -> None:
-    params = with_(setting)
+    params = make_params(setting)
     run = rows(params, 4.0)
     assert 0.0 < run["there_and_back"].max() < 5e-14
     for k in (0, 57, 123):
@@ -102,7 +102,7 @@ def test_the_longer_the_heavier(setting: Mapping[str, Value]) -> None:
 @ARTICLE.verify("A force does not say where to")
 def test_a_force_does_not_say_where_to(setting: Mapping[str, Value]) -> None:
     def sets_out(**changes: Value) -> tuple[np.ndarray, float]:
-        params = with_(setting, **changes)
+        params = make_params(setting, **changes)
         row = at_start(setting, **changes)
         a = plant("ur5").tip_jacobian(params.start) @ row["acceleration"]
         f = params.force
@@ -114,13 +114,13 @@ def test_a_force_does_not_say_where_to(setting: Mapping[str, Value]) -> None:
     assert less == pytest.approx(4, abs=0.5)
     assert np.linalg.norm(along_y) > 2 * np.linalg.norm(along_x)
     assert at_start(setting)["apart"] == pytest.approx(off, rel=1e-12)
-    held = rows(with_(setting), ARTICLE.blocks["A force does not say where to"]["hold"])
+    held = rows(make_params(setting), ARTICLE.blocks["A force does not say where to"]["hold"])
     assert held["apart"][-1] == pytest.approx(14, abs=0.5), "what is read there"
 
 
 @ARTICLE.verify("No torque, no gravity, no rest")
 def test_no_torque_no_gravity_no_rest(setting: Mapping[str, Value]) -> None:
-    run = rows(with_(setting), 3.0)
+    run = rows(make_params(setting), 3.0)
     assert not run["torque"].any()
     assert not run["gravity"].any()
     assert run["v"][100].min() == pytest.approx(-1.1, abs=0.05)
@@ -135,7 +135,7 @@ def test_no_torque_no_gravity_no_rest(setting: Mapping[str, Value]) -> None:
 @ARTICLE.verify("A free fall keeps its energy")
 def test_a_free_fall_keeps_its_energy(setting: Mapping[str, Value]) -> None:
     assert {k: setting[k] for k in FALL} == FALL
-    params = with_(setting)
+    params = make_params(setting)
     assert (params.integrator, params.step) == ("rk4", 0.001)
     run = rows(params, 5.0)
     np.testing.assert_allclose(run["total"], 51.01, atol=0.005)
@@ -147,15 +147,15 @@ def test_a_free_fall_keeps_its_energy(setting: Mapping[str, Value]) -> None:
 
 @ARTICLE.verify("A careless integrator makes energy")
 def test_a_careless_integrator_makes_energy(setting: Mapping[str, Value]) -> None:
-    gained = last(with_(setting), 5.0).energy_drift
-    set_free = rows(with_(FALL), 5.0)["kinetic"].max()
+    gained = last(make_params(setting), 5.0).energy_drift
+    set_free = rows(make_params(FALL), 5.0)["kinetic"].max()
     assert 9.0 < gained < 0.5 * set_free
-    half = last(with_(setting, step=0.002), 5.0).energy_drift
+    half = last(make_params(setting, step=0.002), 5.0).energy_drift
     assert half / gained == pytest.approx(2 / 5, abs=0.05)
-    assert last(with_(setting, integrator="midpoint"), 5.0).energy_drift == pytest.approx(
+    assert last(make_params(setting, integrator="midpoint"), 5.0).energy_drift == pytest.approx(
         0.01, abs=2e-3
     )
-    runge = last(with_(setting, integrator="rk4"), 5.0).energy_drift
+    runge = last(make_params(setting, integrator="rk4"), 5.0).energy_drift
     assert abs(runge) == pytest.approx(0.00006, abs=1e-5)
 
 
@@ -169,7 +169,7 @@ def test_every_experiment_is_verified_here() -> None:
 @pytest.mark.parametrize("robot", POSED_ARMS)
 @pytest.mark.parametrize("drive", ["balanced", "inverse", "none"])
 def test_the_equation_holds_at_every_instant(robot: str, drive: str) -> None:
-    params = with_(
+    params = make_params(
         {"robot": robot, "drive": drive, "payload": 2.0, "damping": 0.5, "speed": 0.4},
         **{"fx": 8.0, "fy": -5.0, "fz": 11.0, "tau1": 3.0, "tau2": -2.0},
     )
@@ -185,7 +185,7 @@ def test_the_equation_holds_at_every_instant(robot: str, drive: str) -> None:
 def test_energy_changes_by_the_power_put_in(robot: str, drive: str) -> None:
     """dE/dt = tau . q' + w . v, by differences of order 4. (The torque is held for half a
     millisecond, which is what the tolerance is for.)"""
-    params = with_(
+    params = make_params(
         {"robot": robot, "drive": drive, "payload": 1.0, "damping": 0.3, "speed": 0.5},
         **{"fy": 6.0, "fz": -4.0, "tau1": 1.0, "step": 0.0005},
     )
@@ -199,7 +199,7 @@ def test_energy_changes_by_the_power_put_in(robot: str, drive: str) -> None:
 
 def test_the_balance_of_energy_survives_what_changes_on_the_way() -> None:
     """Gravity off, a payload on, in mid-flight: neither is an error of the integrator."""
-    params = with_(FALL)
+    params = make_params(FALL)
     state = last(params, 0.5)
     for change in ({"gravity": False}, {"payload": 3.0}, {"gravity": True}, {"fz": 20.0}):
         params = params.change(change)
@@ -214,7 +214,7 @@ def test_the_balance_of_energy_survives_what_changes_on_the_way() -> None:
 )
 def test_energy_drifts_with_the_order_of_the_method(integrator: str, order: int) -> None:
     fine, coarse = (
-        last(with_(FALL, integrator=integrator, step=h, q2=0.5, speed=1.0), 0.4).energy_drift
+        last(make_params(FALL, integrator=integrator, step=h, q2=0.5, speed=1.0), 0.4).energy_drift
         for h in (0.001, 0.002)
     )
     assert abs(fine) > 1e-10
@@ -224,7 +224,7 @@ def test_energy_drifts_with_the_order_of_the_method(integrator: str, order: int)
 @pytest.mark.parametrize("robot", POSED_ARMS)
 def test_it_falls_as_scipy_says(robot: str) -> None:
     """The same equation, solved from its matrices by an adaptive method of order 8."""
-    params = with_({"robot": robot, "drive": "none", "payload": 1.0, "fy": 5.0, "tau1": 2.0})
+    params = make_params({"robot": robot, "drive": "none", "payload": 1.0, "fy": 5.0, "tau1": 2.0})
     world = plant_under_gravity(robot, 1.0, True)
     n = world.model.nv
     tau = params.torques(n)
@@ -244,7 +244,7 @@ def test_it_falls_as_scipy_says(robot: str) -> None:
 
 def test_balanced_it_stays() -> None:
     for robot in POSED_ARMS:
-        params = with_({"robot": robot, "drive": "balanced", "payload": 3.0})
+        params = make_params({"robot": robot, "drive": "balanced", "payload": 3.0})
         state = last(params, 1.0)
         np.testing.assert_allclose(state.q, params.start, atol=1e-12)
 
@@ -255,7 +255,7 @@ def test_inverse_dynamics_moves_it_as_asked(robot: str) -> None:
     time the torque is held goes to zero: half of it, half the error."""
 
     def errors(step: float) -> np.ndarray:
-        params = with_({"robot": robot, "fy": 10.0, "payload": 1.0, "step": step})
+        params = make_params({"robot": robot, "fy": 10.0, "payload": 1.0, "step": step})
         n = plant(robot).model.nv
         w = 2 * np.pi / params.swing
         moved = params.accelerations(n, 0.0) / w**2 * (1 - np.cos(w))
@@ -287,7 +287,9 @@ def test_the_torque_asked_for_holds_against_the_force() -> None:
 def test_damping_takes_the_kinetic_energy(robot: str) -> None:
     """Balanced against gravity, d/dt of (q' M q' / 2) = -b |q'|^2."""
     run = rows(
-        with_({"robot": robot, "drive": "balanced", "damping": 1.0, "speed": 1.0, "step": 0.0005}),
+        make_params(
+            {"robot": robot, "drive": "balanced", "damping": 1.0, "speed": 1.0, "step": 0.0005}
+        ),
         1.0,
     )
     lost = run["kinetic"][0] - run["kinetic"]
@@ -298,7 +300,7 @@ def test_damping_takes_the_kinetic_energy(robot: str) -> None:
 
 
 def test_it_stops_before_numbers_mean_nothing() -> None:
-    params = with_({"robot": "double-pendulum", "drive": "balanced", "tau2": 30.0})
+    params = make_params({"robot": "double-pendulum", "drive": "balanced", "tau2": 30.0})
     *_, sane, stopped = states(params, 20.0)
     assert "t = " in stopped.trouble
     assert np.linalg.norm(stopped.v) <= SPEED_LIMIT
@@ -307,7 +309,7 @@ def test_it_stops_before_numbers_mean_nothing() -> None:
 
 
 def test_a_state_can_be_kept_and_rewound() -> None:
-    params = with_({})
+    params = make_params({})
     kept = last(params, 0.3)
     copied = copy.deepcopy(kept)
     after = LAB.step(params, Inputs(), kept)
@@ -321,7 +323,7 @@ def test_a_state_can_be_kept_and_rewound() -> None:
 
 
 def test_the_trail_is_where_the_end_effector_was() -> None:
-    params = with_({})
+    params = make_params({})
     path = list(states(params, 0.4))
     where = np.array([plant("ur5").tip(s.q) for s in path])
     np.testing.assert_allclose(path[-1].trail[-21:], where[::2], atol=1e-12)

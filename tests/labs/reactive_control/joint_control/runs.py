@@ -10,10 +10,10 @@ from labs.models.plant import plant
 from labs.params import Value
 from labs.reactive_control.joint_control.lab import JointControl, JointState
 from labs.reactive_control.joint_control.params import JointParams
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 
 LAB = JointControl()
-ARTICLE = Experiments("labs.reactive_control", "joint_control")
+ARTICLE = ArticleExperiments("labs.reactive_control", "joint_control")
 PUSHED = Inputs(actions=("push",))
 
 

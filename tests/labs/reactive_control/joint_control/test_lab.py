@@ -177,7 +177,7 @@ def arrays(state: JointState) -> list[np.ndarray]:
     return [value for value in vars(state).values() if isinstance(value, np.ndarray)]
 
 
-def same(one: JointState, other: JointState) -> bool:
+def same_state(one: JointState, other: JointState) -> bool:
     pairs = zip(arrays(one), arrays(other), strict=True)
     return one.t == other.t and all(np.array_equal(a, b) for a, b in pairs)
 
@@ -185,9 +185,9 @@ def same(one: JointState, other: JointState) -> bool:
 def test_the_same_seed_gives_the_same_bits() -> None:
     params = parameters({}, noise=0.003, controller="pid", ki=50.0)
     one, two = (list(states(params, 1.0, {20: PUSHED}, seed=3)) for _ in range(2))
-    assert all(same(a, b) for a, b in zip(one, two, strict=True))
+    assert all(same_state(a, b) for a, b in zip(one, two, strict=True))
     other = list(states(params, 1.0, {20: PUSHED}, seed=4))
-    assert not same(one[-1], other[-1])
+    assert not same_state(one[-1], other[-1])
 
 
 def test_a_state_can_be_kept_and_rewound() -> None:
@@ -196,8 +196,8 @@ def test_a_state_can_be_kept_and_rewound() -> None:
     copied = copy.deepcopy(kept)
     after = LAB.step(params, PUSHED, kept)
     LAB.step(params.change({"payload": 4.0}), Inputs(), after)
-    assert same(kept, copied)
-    assert same(LAB.step(params, PUSHED, copied), after)
+    assert same_state(kept, copied)
+    assert same_state(LAB.step(params, PUSHED, copied), after)
     for old in arrays(kept):
         assert not any(np.shares_memory(old, new) for new in arrays(after))
 
@@ -206,7 +206,7 @@ def test_trouble_keeps_the_last_sane_state() -> None:
     params = parameters(ARTICLE.settings["A slow controller chatters"], torque_limits=False)
     *_, sane, stopped = states(params, 1.0)
     assert f"t = {stopped.t:.2f} s" in stopped.trouble
-    assert same(sane, stopped)
+    assert same_state(sane, stopped)
     assert LAB.step(params, PUSHED, stopped) is stopped
     check_measure(params, stopped, sane)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 
 from labs.models.plant import plant
-from labs.plots import field_names, measured
+from labs.plots import channel_names, field_names
 from tests.labs.reactive_control.joint_control.runs import LAB, final_state, gravity, parameters
 
 
@@ -33,5 +33,5 @@ def test_plots_name_real_channels() -> None:
     rest = final_state(params, 5.0)
     measure, fields = LAB.measure(params, rest), LAB.fields(params, rest)
     for plot in LAB.plots:
-        assert set(measured(plot)) <= set(measure)
+        assert set(channel_names(plot)) <= set(measure)
         assert set(field_names(plot)) <= set(fields)

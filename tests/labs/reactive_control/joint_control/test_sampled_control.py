@@ -7,10 +7,10 @@ from scipy.integrate import solve_ivp
 from labs.algorithms.integrators import INTEGRATORS
 from labs.reactive_control.joint_control.sampled_control import (
     SampledLoop,
+    control_ticks,
     simulate_sampled,
-    ticks,
     time_between_ticks,
-    units,
+    to_time_units,
 )
 
 HOME = np.zeros(2)
@@ -51,13 +51,13 @@ def references(m: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def test_ticks_fall_on_the_first_step_at_or_after_their_time(
     since: int, period: int, step: int, steps: int, due: tuple[int, ...], left: int
 ) -> None:
-    assert ticks(since, period, step, steps) == (due, left)
+    assert control_ticks(since, period, step, steps) == (due, left)
 
 
 def test_the_time_between_ticks_is_rounded_up_to_whole_steps() -> None:
-    assert time_between_ticks(units(0.005), units(0.002)) == 60
-    assert time_between_ticks(units(0.001), units(0.01)) == 100
-    assert time_between_ticks(units(0.05), units(0.0001)) == 500
+    assert time_between_ticks(to_time_units(0.005), to_time_units(0.002)) == 60
+    assert time_between_ticks(to_time_units(0.001), to_time_units(0.01)) == 100
+    assert time_between_ticks(to_time_units(0.05), to_time_units(0.0001)) == 500
 
 
 def test_the_torque_is_held_between_ticks() -> None:

@@ -10,9 +10,9 @@ from scipy.optimize import fsolve
 from labs.algorithms.integrators import INTEGRATORS
 from labs.algorithms.joint_control import CONTROL_LAWS, Gains
 from labs.models.plant import plant
-from labs.reactive_control.joint_control.divergence import explain
+from labs.reactive_control.joint_control.divergence import divergence_message
 from labs.reactive_control.joint_control.remedies import (
-    MARGIN,
+    GAIN_MARGIN,
     AvailableSettings,
     find_remedies,
     robustly_stable,
@@ -209,7 +209,7 @@ DIVERGING_BY_DAMPING = LoopParameters("pid", Gains(330.0, 0.0, 60.0), 0.01, "exp
 def test_a_stable_interval_is_named_by_both_ends() -> None:
     loop, setting = linear(), DIVERGING_BY_DAMPING
     grows = {
-        kd: loop.growth(replace(setting, gains=Gains(330.0, 0.0, kd))) > GROWTH_TOLERANCE
+        kd: loop.growth_rate(replace(setting, gains=Gains(330.0, 0.0, kd))) > GROWTH_TOLERANCE
         for kd in (1.5, 8.0, 60.0)
     }
     assert grows == {1.5: True, 8.0: False, 60.0: True}
@@ -219,10 +219,10 @@ def test_a_stable_interval_is_named_by_both_ends() -> None:
         if proposal.text.startswith("k_d from")
         for s in proposal.settings
     )
-    assert 3.3 * MARGIN < low < high < 15.0
+    assert 3.3 * GAIN_MARGIN < low < high < 15.0
     for kd in np.linspace(low, high, 12):
-        assert loop.growth(replace(setting, gains=Gains(330.0, 0.0, kd))) <= GROWTH_TOLERANCE
-    assert f"k_d from {low:g} to {high:g}" in explain([loop], setting, AVAILABLE)
+        assert loop.growth_rate(replace(setting, gains=Gains(330.0, 0.0, kd))) <= GROWTH_TOLERANCE
+    assert f"k_d from {low:g} to {high:g}" in divergence_message([loop], setting, AVAILABLE)
 
 
 def test_where_nothing_helps_nothing_is_proposed() -> None:
@@ -230,10 +230,10 @@ def test_where_nothing_helps_nothing_is_proposed() -> None:
     only_slow = AvailableSettings((0.05,), (0.01,), 0.02, 0.02)
     setting = replace(UNSTABLE["gains"], control_period=0.05, step=0.01)
     assert find_remedies([linear()], setting, only_slow) == []
-    sentence = explain([linear()], setting, only_slow)
+    sentence = divergence_message([linear()], setting, only_slow)
     assert sentence.endswith("No stable setting was found near this one.")
     assert "Try" not in sentence
-    assert "Try" not in explain([linear()], DEFAULT, AVAILABLE)
+    assert "Try" not in divergence_message([linear()], DEFAULT, AVAILABLE)
 
 
 def test_a_loop_that_needs_its_motors_to_survive_the_integrator_is_not_proposed() -> None:
@@ -241,8 +241,8 @@ def test_a_loop_that_needs_its_motors_to_survive_the_integrator_is_not_proposed(
     makes the linear loop stable, and with a motor at its limit it is not."""
     loop = linear(payload=2.8, friction=18.8)
     setting = LoopParameters("pid", Gains(1000.0, 0.0, 0.5), 0.002, "explicit-euler", 0.01)
-    assert loop.growth(setting) < -1.0
-    assert loop.growth(replace(setting, controller="open-loop")) > 10.0
+    assert loop.growth_rate(setting) < -1.0
+    assert loop.growth_rate(replace(setting, controller="open-loop")) > 10.0
     assert not robustly_stable([loop], setting)
 
 
@@ -258,10 +258,13 @@ def test_the_sag_is_where_the_robot_rests() -> None:
         return lacking
 
     rest = fsolve(torque, home, xtol=1e-12)
-    assert loop.sag(setting) == pytest.approx(np.abs(rest - home).max(), rel=0.02)
-    assert linear().sag(setting) == 0.0
-    assert loop.sag(replace(setting, controller="pid", gains=Gains(2000.0, 1.0, 30.0))) == 0.0
-    assert loop.sag(replace(setting, gains=Gains(0.0, 0.0, 30.0))) > 1.0
+    assert loop.static_deviation(setting) == pytest.approx(np.abs(rest - home).max(), rel=0.02)
+    assert linear().static_deviation(setting) == 0.0
+    assert (
+        loop.static_deviation(replace(setting, controller="pid", gains=Gains(2000.0, 1.0, 30.0)))
+        == 0.0
+    )
+    assert loop.static_deviation(replace(setting, gains=Gains(0.0, 0.0, 30.0))) > 1.0
 
 
 def test_the_default_is_stable_for_every_robot() -> None:
@@ -273,19 +276,19 @@ def test_the_default_is_stable_for_every_robot() -> None:
 
 def test_explicit_euler_needs_damping_of_h_times_k_p() -> None:
     """v+ = v - h/m (k_p q + k_d v), q+ = q + h v has |z|^2 = 1 - h k_d/m + h^2 k_p/m."""
-    sentence = explain([linear()], UNSTABLE["integrator"], AVAILABLE)
+    sentence = divergence_message([linear()], UNSTABLE["integrator"], AVAILABLE)
     assert "Explicit Euler with 1 ms" in sentence
     assert "Semi-implicit Euler or k_d from 0.32 to 120." in sentence
 
 
 def test_the_sentences_name_the_fault() -> None:
-    assert "The gains are at fault" in explain([linear()], UNSTABLE["gains"], AVAILABLE)
-    assert "k_i of at most" in explain([linear()], UNSTABLE["gains"], AVAILABLE)
-    sentence = explain([linear()], UNSTABLE["period"], AVAILABLE)
+    assert "The gains are at fault" in divergence_message([linear()], UNSTABLE["gains"], AVAILABLE)
+    assert "k_i of at most" in divergence_message([linear()], UNSTABLE["gains"], AVAILABLE)
+    sentence = divergence_message([linear()], UNSTABLE["period"], AVAILABLE)
     assert "The control period is at fault: with continuous control the error would not grow" in (
         sentence
     )
     assert "Try a control period of 2 ms or k_d from 3.6 to 6.2." in sentence
-    open_loop = explain([linear()], replace(DEFAULT, controller="open-loop"), AVAILABLE)
+    open_loop = divergence_message([linear()], replace(DEFAULT, controller="open-loop"), AVAILABLE)
     assert "Nothing feeds the error back" in open_loop
-    assert "stable" in explain([linear()], DEFAULT, AVAILABLE)
+    assert "stable" in divergence_message([linear()], DEFAULT, AVAILABLE)

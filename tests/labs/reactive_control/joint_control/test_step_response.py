@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from labs.reactive_control.joint_control.step_response import BAND, StepResponse
+from labs.reactive_control.joint_control.step_response import SETTLING_BAND, StepResponse
 
 
 def respond(error: np.ndarray, times: np.ndarray) -> StepResponse:
@@ -25,7 +25,7 @@ def test_the_second_order_response(size: float) -> None:
     response = respond(error, t)
     expected = np.exp(-np.pi * zeta / np.sqrt(1 - zeta**2))
     assert response.overshoot == pytest.approx(expected, rel=1e-6)
-    outside = t[np.abs(shape) > BAND]
+    outside = t[np.abs(shape) > SETTLING_BAND]
     assert response.settled == pytest.approx(outside[-1] + (t[1] - t[0]), abs=1e-9)
 
 

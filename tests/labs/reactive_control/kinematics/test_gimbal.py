@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from labs.algorithms.orientation import SEQUENCES, lock_sine, skew
+from labs.algorithms.orientation import SEQUENCES, gimbal_lock_sine, skew
 from labs.reactive_control.kinematics.gimbal import Gimbal
 
 every_sequence = pytest.mark.parametrize("sequence", SEQUENCES)
@@ -16,7 +16,9 @@ def test_in_the_middle_it_is_this_far_from_the_lock(sequence: str) -> None:
         gimbal = Gimbal(sequence, distance, "lost", 0.1)
         middle = Rotation.from_euler(sequence.upper(), [0.0, gimbal.middle, 0.0]).as_matrix()
         np.testing.assert_allclose(gimbal.rotation(0.0), middle, atol=1e-15)
-        assert lock_sine(sequence, gimbal.middle) == pytest.approx(np.sin(distance), abs=1e-15)
+        assert gimbal_lock_sine(sequence, gimbal.middle) == pytest.approx(
+            np.sin(distance), abs=1e-15
+        )
 
 
 @every_sequence

@@ -11,20 +11,20 @@ from labs.algorithms.frame_chain import FrameChain
 from labs.algorithms.orientation import (
     SEQUENCES,
     euler_rates,
-    lock_sine,
+    gimbal_lock_sine,
     matrix_to_euler,
     matrix_to_rpy,
 )
 from labs.lab import Inputs
-from labs.models.arms import load
+from labs.models.arms import load_arm
 from labs.params import Value
 from labs.reactive_control.kinematics.lab import MAX_AMPLIFICATION, Kinematics, KinematicsState
 from labs.reactive_control.kinematics.params import KinematicsParams
 from labs.scene import NullScene
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 
 LAB = Kinematics()
-ARTICLE = Experiments("labs.reactive_control", "kinematics")
+ARTICLE = ArticleExperiments("labs.reactive_control", "kinematics")
 
 
 def parameters(setting: Mapping[str, Value], **changes: Value) -> KinematicsParams:
@@ -53,7 +53,7 @@ def fields(params: KinematicsParams) -> Mapping[str, np.ndarray]:
 
 
 def test_a_robot_stops_at_its_limits() -> None:
-    model = load("panda").model
+    model = load_arm("panda").model
     params = parameters({}, robot="panda", q4=3.0, q2=-3.0)
     assert params.q[3] == model.upperPositionLimit[3]
     assert params.q[1] == model.lowerPositionLimit[1]
@@ -61,7 +61,7 @@ def test_a_robot_stops_at_its_limits() -> None:
 
 
 def test_the_slider_moved_last_chooses_the_factor() -> None:
-    arm, params = load("ur5"), parameters({})
+    arm, params = load_arm("ur5"), parameters({})
     state = LAB.step(params, Inputs(), LAB.init(params, np.random.default_rng(0)))
     assert state.moved == 1
     for i in (4, 2, 7):
@@ -118,7 +118,9 @@ def test_amplification_is_that_of_the_rates(sequence: str, direction: str) -> No
         rates = euler_rates(sequence, angles, params.gimbal.axis)
         measure = LAB.measure(params, state)
         assert measure["amplification"] == pytest.approx(np.abs(rates).max(), rel=1e-5)
-        assert measure["law"] == pytest.approx(1.0 / lock_sine(sequence, angles[1]), rel=1e-12)
+        assert measure["law"] == pytest.approx(
+            1.0 / gimbal_lock_sine(sequence, angles[1]), rel=1e-12
+        )
         assert measure["amplification"] <= measure["law"] * (1.0 + 1e-5)
 
 
@@ -312,7 +314,7 @@ def test_another_sequence(setting: Mapping[str, Value]) -> None:
     assert fields(params)["euler"][0, 1] == pytest.approx(np.pi / 2, abs=0.1)
     # Its own lock: the z axis vertical.
     upright = matrix_to_euler("zyz", Rotation.from_euler("z", 0.4).as_matrix())
-    assert lock_sine("zyz", upright[1]) == 0.0
+    assert gimbal_lock_sine("zyz", upright[1]) == 0.0
     assert ARTICLE.answer("Another sequence") == "No."
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.lab import Inputs
 from labs.models.plant import plant
@@ -15,15 +15,15 @@ from labs.reactive_control.statics.lab import FORCE_ARROW, Statics, StaticsState
 from labs.reactive_control.statics.params import StaticsParams
 from labs.scene import NullScene
 from labs.tasks.arm.postures import POSED_ARMS, POSTURES
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 
 LAB = Statics()
-ARTICLE = Experiments("labs.reactive_control", "statics")
+ARTICLE = ArticleExperiments("labs.reactive_control", "statics")
 EVERY = [(robot, name) for robot in POSED_ARMS for name in POSTURES]
 Row = dict[str, np.ndarray]
 
 
-def with_(setting: Mapping[str, Value] = {}, **changes: Value) -> StaticsParams:
+def make_params(setting: Mapping[str, Value] = {}, **changes: Value) -> StaticsParams:
     return StaticsParams().change({**setting, **changes})
 
 
@@ -31,9 +31,9 @@ def start(params: StaticsParams) -> StaticsState:
     return LAB.init(params, np.random.default_rng(0))
 
 
-def at(setting: Mapping[str, Value], **changes: Value) -> Row:
+def measured_at_start(setting: Mapping[str, Value], **changes: Value) -> Row:
     """All that is measured at the start."""
-    params = with_(setting, **changes)
+    params = make_params(setting, **changes)
     return {k: np.asarray(v) for k, v in LAB.measure(params, start(params)).items()}
 
 
@@ -42,7 +42,7 @@ def at(setting: Mapping[str, Value], **changes: Value) -> Row:
 
 @ARTICLE.verify("Thirty kilograms on a bent arm")
 def test_a_load_on_a_bent_arm(setting: Mapping[str, Value]) -> None:
-    tau = at(setting)["tau"]
+    tau = measured_at_start(setting)["tau"]
     assert tau[[0, 5]] == pytest.approx(0.0, abs=1e-9)
     assert tau[1:4] == pytest.approx([154, 145, 28.4], abs=0.5)
     limit = plant("ur5").arm.torque_limit
@@ -53,49 +53,49 @@ def test_a_load_on_a_bent_arm(setting: Mapping[str, Value]) -> None:
 
 @ARTICLE.verify("Moving without power")
 def test_moving_without_power(setting: Mapping[str, Value]) -> None:
-    row = at(setting)
+    row = measured_at_start(setting)
     assert row["force"] == 300.0
     assert np.linalg.norm(row["twist"][:3]) > 1.0
     assert abs(row["joint_power"]) < 1e-8
     assert abs(row["tip_power"]) < 1e-8
     for k in range(1, 7):
-        assert abs(at(setting, **{f"dq{k}": -1.7})["tip_power"]) < 1e-7
-    bent = at(setting, q3=0.1)
+        assert abs(measured_at_start(setting, **{f"dq{k}": -1.7})["tip_power"]) < 1e-7
+    bent = measured_at_start(setting, q3=0.1)
     assert abs(bent["joint_power"]) > 1.0
     assert bent["joint_power"] == pytest.approx(bent["tip_power"], rel=1e-13)
 
 
 @ARTICLE.verify("The same load on a straight arm")
 def test_a_straight_arm_carries_for_nothing(setting: Mapping[str, Value]) -> None:
-    row = at(setting)
+    row = measured_at_start(setting)
     assert row["force"] == 300.0
     np.testing.assert_allclose(row["tau"], 0.0, atol=1e-8)
-    assert at(setting, q3=0.3)["tau"][1:3] == pytest.approx([43, 43], abs=0.5)
+    assert measured_at_start(setting, q3=0.3)["tau"][1:3] == pytest.approx([43, 43], abs=0.5)
     assert ARTICLE.answer("The same load on a straight arm") == "None."
 
 
 @ARTICLE.verify("Across instead of along")
 def test_across_instead_of_along(setting: Mapping[str, Value]) -> None:
-    params = with_(setting)
-    tau = at(setting)["tau"]
+    params = make_params(setting)
+    tau = measured_at_start(setting)["tau"]
     assert np.abs(tau[1:3]) == pytest.approx([27, 14.6], abs=0.5)
     assert abs(tau[1]) / 30.0 == pytest.approx(0.91, abs=0.005)
-    along = at(setting, fx=300.0, fz=0.0)["effort"]
+    along = measured_at_start(setting, fx=300.0, fz=0.0)["effort"]
     assert along < 1e-8
     dearest, *_, cheapest = LAB.fields(params, start(params))["per_force"]
     assert (dearest, cheapest) == (pytest.approx(1.04, abs=0.005), pytest.approx(0.0, abs=1e-9))
-    assert at(setting)["arm_length"] == pytest.approx(dearest, rel=1e-3)
+    assert measured_at_start(setting)["arm_length"] == pytest.approx(dearest, rel=1e-3)
     assert ARTICLE.answer("Across instead of along") == "Far more."
 
 
 @ARTICLE.verify("A moment looks the same from everywhere")
 def test_a_moment_is_felt_along_each_axis(setting: Mapping[str, Value]) -> None:
     for changes in ({}, {"q2": 0.5}, {"q3": -0.7}):
-        tau = at(setting, **changes)["tau"]
+        tau = measured_at_start(setting, **changes)["tau"]
         assert tau[0] == pytest.approx(25.0, abs=1e-9)
         assert tau[1:4] == pytest.approx([0.0] * 3, abs=1e-9)
-    assert at(setting)["tau"][5] == pytest.approx(-25.0, abs=0.01)
-    assert abs(at(setting, q2=0.5)["tau"][5] + 25.0) > 1.0
+    assert measured_at_start(setting)["tau"][5] == pytest.approx(-25.0, abs=0.01)
+    assert abs(measured_at_start(setting, q2=0.5)["tau"][5] + 25.0) > 1.0
     assert ARTICLE.answer("A moment looks the same from everywhere") == "25 and −25 N·m"
 
 
@@ -109,7 +109,7 @@ def test_every_experiment_is_verified_here() -> None:
 @pytest.mark.parametrize(("robot", "posture"), EVERY)
 def test_torque_is_what_virtual_work_says(robot: str, posture: str) -> None:
     """tau_i = f . dp/dq_i + m . (rotation per dq_i), by finite differences of the placement."""
-    params = with_(
+    params = make_params(
         {"robot": robot, "posture": posture, "q1": 0.4, "q2": -0.3, "q4": 0.2, "q5": 0.9},
         **{"fx": 31.0, "fy": -47.0, "fz": 11.0, "mx": 3.0, "my": -7.0, "mz": 5.0},
     )
@@ -134,7 +134,7 @@ def test_torque_is_what_virtual_work_says(robot: str, posture: str) -> None:
 def test_torque_holds_against_the_wrench(robot: str) -> None:
     """With -tau + g(q) at the joints and w at the end-effector nothing accelerates: Pinocchio
     takes w as a force on the last body, in its own frame, without any Jacobian."""
-    params = with_({"robot": robot, "fx": 20.0, "fy": 30.0, "mz": 4.0, "mx": -2.0, "q2": 0.3})
+    params = make_params({"robot": robot, "fx": 20.0, "fy": 30.0, "mz": 4.0, "mx": -2.0, "q2": 0.3})
     world = plant(robot)
     model, data = world.model, world.model.createData()
     pin.framesForwardKinematics(model, data, params.q)
@@ -157,25 +157,25 @@ def test_the_two_powers_are_one(robot: str, posture: str) -> None:
         drawn |= {f"q{k}": float(rng.uniform(-1, 1)) for k in range(1, 8)}
         drawn |= {axis: float(rng.uniform(-300, 300)) for axis in ("fx", "fy", "fz")}
         drawn |= {axis: float(rng.uniform(-40, 40)) for axis in ("mx", "my", "mz")}
-        row = at({"robot": robot, "posture": posture}, **drawn)
+        row = measured_at_start({"robot": robot, "posture": posture}, **drawn)
         size = row["effort"] * np.sqrt(7 * 4.0)
         assert row["power_gap"] <= 1e-14 * size
         assert row["wrench"] @ row["twist"] == row["tip_power"]
-        params = with_({"robot": robot, "posture": posture, **drawn})
+        params = make_params({"robot": robot, "posture": posture, **drawn})
         assert row["tau"] @ params.dq == row["joint_power"]
 
 
 @pytest.mark.parametrize("robot", POSED_ARMS)
 def test_singular_values_bound_the_torque_of_a_force(robot: str) -> None:
     rng = np.random.default_rng(4)
-    params = with_({"robot": robot, "q2": 0.3})
+    params = make_params({"robot": robot, "q2": 0.3})
     sigma = LAB.fields(params, start(params))["per_force"]
     assert (np.diff(sigma) <= 0.0).all()
     for _ in range(20):
         f = rng.uniform(-100, 100, 3)
         if robot == "double-pendulum":
             f[0] = 0.0  # across its plane the hinges' bearings carry everything
-        row = at({"robot": robot, "q2": 0.3, "fx": f[0], "fy": f[1], "fz": f[2]})
+        row = measured_at_start({"robot": robot, "q2": 0.3, "fx": f[0], "fy": f[1], "fz": f[2]})
         assert sigma[-1] - 1e-12 <= row["arm_length"] <= sigma[0] + 1e-12
 
 
@@ -183,7 +183,7 @@ def test_singular_values_bound_the_torque_of_a_force(robot: str) -> None:
 
 
 def test_the_force_and_its_knobs_follow_the_handle() -> None:
-    world = World(find("statics"))
+    world = World(find_lab("statics"))
     world.change({"q2": 0.4})
     tip = plant("ur5").tip(world.params.q)  # type: ignore[attr-defined]
     x, y, z = map(float, tip + FORCE_ARROW * np.array([12.0, 90.4, -120.0]))
@@ -196,8 +196,12 @@ def test_the_force_and_its_knobs_follow_the_handle() -> None:
 
 
 def test_dragging_pulls_no_harder_than_the_sliders() -> None:
-    assert LAB.edit(with_(), "pull", (9.0, -9.0, 9.0)) == {"fx": 300.0, "fy": -300.0, "fz": 300.0}
-    assert LAB.edit(with_(), "other", (9.0, 9.0, 9.0)) == {}
+    assert LAB.edit(make_params(), "pull", (9.0, -9.0, 9.0)) == {
+        "fx": 300.0,
+        "fy": -300.0,
+        "fz": 300.0,
+    }
+    assert LAB.edit(make_params(), "other", (9.0, 9.0, 9.0)) == {}
 
 
 def test_the_handle_is_at_the_arrows_tip() -> None:
@@ -209,7 +213,7 @@ def test_the_handle_is_at_the_arrows_tip() -> None:
         def handle(self, name, position, radius=0.05):  # type: ignore[no-untyped-def]
             self.ball = position
 
-    scene, params = Places(), with_()
+    scene, params = Places(), make_params()
     LAB.draw(scene, params, start(params))
     np.testing.assert_array_equal(scene.end, scene.ball)
     tip = plant("ur5").tip(params.q)
@@ -217,7 +221,7 @@ def test_the_handle_is_at_the_arrows_tip() -> None:
 
 
 def test_time_passes_and_nothing_else() -> None:
-    params = with_()
+    params = make_params()
     state = start(params)
     after = LAB.step(params, Inputs(), state)
     assert after.t == pytest.approx(LAB.period)
@@ -233,7 +237,7 @@ def test_arcs_turn_the_way_the_torques_do() -> None:
         def arc(self, name, center, axis, angle, radius, color="force"):  # type: ignore[no-untyped-def]
             arcs[name] = (np.asarray(center), np.asarray(axis), angle, color)
 
-    params = with_(ARTICLE.settings["Thirty kilograms on a bent arm"])
+    params = make_params(ARTICLE.settings["Thirty kilograms on a bent arm"])
     arcs: dict[str, tuple[np.ndarray, np.ndarray, float, str]] = {}
     LAB.draw(Arcs(), params, start(params))
     assert set(arcs) == {"torque 2", "torque 3", "torque 4"}

@@ -8,13 +8,13 @@ import pytest
 from labs import resumable
 from labs.algorithms.bandits import SAMPLE_MEAN
 from labs.problems.episodes import step_size
-from labs.reinforcement_learning.bandits.game import Game, deal, play
-from labs.reinforcement_learning.bandits.params import TASKS, BanditParams
-from tests.labs.contract import same
-from tests.labs.experiments import Experiments
-from tests.labs.solving import Settings, done, readouts, solve, solved_world
+from labs.reinforcement_learning.bandits.game import Game, initial_game, play
+from labs.reinforcement_learning.bandits.params import TASK_COUNT, BanditParams
+from tests.labs.contract import bitwise_equal
+from tests.labs.experiments import ArticleExperiments
+from tests.labs.solving import Settings, readouts, solve, solved_world, stop_reason
 
-EXPERIMENTS = Experiments("labs.reinforcement_learning", "bandits")
+EXPERIMENTS = ArticleExperiments("labs.reinforcement_learning", "bandits")
 
 
 def regrets(setting: Settings, **changes: float | str | bool) -> tuple[float, float]:
@@ -50,8 +50,8 @@ def test_boltzmann_forgets_who_was_unlucky(setting: Settings) -> None:
     assert regrets(setting, beta=4.0)[0] == pytest.approx(137, abs=8.0)
     assert EXPERIMENTS.answer("One unlucky cost") == "between 137 and 531."
     sorted_regret = np.sort(solved_world("bandits", setting).state.game["regret"][0])
-    assert sorted_regret[TASKS // 4] < 60.0
-    assert sorted_regret[-TASKS // 4] > 400.0
+    assert sorted_regret[TASK_COUNT // 4] < 60.0
+    assert sorted_regret[-TASK_COUNT // 4] > 400.0
 
 
 @EXPERIMENTS.verify("Bounds that close")
@@ -160,7 +160,7 @@ def test_both_strategies_meet_the_same_luck_and_a_game_begins_anew() -> None:
     world = solved_world("bandits", {"first": "bound", "second": "bound", "turns": 200.0})
     game = world.state.game
     assert np.array_equal(game["regret"][0], game["regret"][1])
-    assert done(world) == f"200 turns of {TASKS} players each."
+    assert stop_reason(world) == f"200 turns of {TASK_COUNT} players each."
     world.change({"bound": 2.0})
     solve(world)
     again = world.state.game
@@ -190,13 +190,13 @@ def test_long_games_pause_and_come_to_the_same(monkeypatch: pytest.MonkeyPatch) 
     """250 turns, the last lessons and the first of the test among them."""
     params = BanditParams(everybody=True, turns=150.0, kind="active", drift=0.05)
     found = []
-    for piece in (resumable.PIECE, 1e12):
-        monkeypatch.setattr(resumable, "PIECE", piece)
-        found.append(ended(play(params, deal(params, np.random.default_rng(1)), 250)))
+    for piece in (resumable.OPERATIONS_BETWEEN_PAUSES, 1e12):
+        monkeypatch.setattr(resumable, "OPERATIONS_BETWEEN_PAUSES", piece)
+        found.append(ended(play(params, initial_game(params, np.random.default_rng(1)), 250)))
     (pauses, game), (fewest, at_once) = found
     assert fewest == 2 * len(params.strategies)
     assert pauses >= 4 * fewest
-    assert same(game, at_once)
+    assert bitwise_equal(game, at_once)
 
 
 def ended(work: resumable.Resumable[Game]) -> tuple[int, dict[str, np.ndarray]]:

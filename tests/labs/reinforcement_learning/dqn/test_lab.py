@@ -9,17 +9,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.engine.solution import Solution
 from labs.params import Value
-from labs.reinforcement_learning.dqn.controllers import compared
+from labs.reinforcement_learning.dqn.controllers import baseline_costs
 from labs.reinforcement_learning.dqn.tasks import learning_task, posture_at
 from labs.tasks.environments.reach import reach
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 
-EXPERIMENTS = Experiments("labs.reinforcement_learning", "dqn")
-ENTRY = find("dqn")
+EXPERIMENTS = ArticleExperiments("labs.reinforcement_learning", "dqn")
+ENTRY = find_lab("dqn")
 
 
 def trained(setting: Mapping[str, Value], **changes: Value) -> World:
@@ -48,8 +48,8 @@ def test_three_learners_swing_up(setting: Mapping[str, Value]) -> None:
         EXPERIMENTS.answer("How long does it take?"), abs=4
     )
     assert (np.diff(training["greedy"], axis=1) > 0).any(axis=1).all()
-    assert compared() == pytest.approx((107, 129), abs=1.0)
-    assert (training["best_cost"] > compared()[0]).all()
+    assert baseline_costs() == pytest.approx((107, 129), abs=1.0)
+    assert (training["best_cost"] > baseline_costs()[0]).all()
     assert (training["best_cost"] < 130).all()
 
 
@@ -206,12 +206,14 @@ def test_a_target_out_of_reach_is_met_as_near_as_it_goes() -> None:
 @pytest.mark.parametrize("name", ["pendulum", "double-pendulum", "ur5"])
 def test_maps_go_through_the_middle_and_observations_lie_on_them(name: str) -> None:
     task = learning_task(name)
-    X = task.robot.starts(np.arange(1, 5, dtype=np.uint64), 50)
+    X = task.robot.initial_states(np.arange(1, 5, dtype=np.uint64), 50)
     if name == "ur5":
         X[:, 4:] = X[0, 4:]
-    at = task.place(X)
-    seen = task.seen(task.robot.observe(X))
+    at = task.map_position(X)
+    seen = task.map_coordinates(task.robot.observe(X))
     np.testing.assert_allclose(seen, at, atol=1e-5)
-    assert (np.abs(at) <= task.reach + 1e-9).all()
-    nodes = task.nodes(task.base)
-    np.testing.assert_allclose(np.abs(task.place(nodes[:1])), task.reach[None], atol=1e-6)
+    assert (np.abs(at) <= task.half_range + 1e-9).all()
+    nodes = task.map_states(task.base)
+    np.testing.assert_allclose(
+        np.abs(task.map_position(nodes[:1])), task.half_range[None], atol=1e-6
+    )

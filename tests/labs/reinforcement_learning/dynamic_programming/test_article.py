@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
-from labs.reinforcement_learning.dynamic_programming.side_by_side import ITERATION_METHODS
+from labs.reinforcement_learning.dynamic_programming.iteration_comparison import ITERATION_METHODS
 from labs.reinforcement_learning.dynamic_programming.tasks import finite_horizon
 from labs.tasks.grid_world.map import GridWorld
 from labs.tasks.grid_world.walk import nominal_path
 from labs.tasks.pendulum_table.table import PendulumGrid
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 from tests.labs.reinforcement_learning.dynamic_programming.worlds import (
     SLUG,
     Setting,
@@ -18,7 +18,7 @@ from tests.labs.reinforcement_learning.dynamic_programming.worlds import (
     solved,
 )
 
-ARTICLE = Experiments("labs.reinforcement_learning", "dynamic_programming")
+ARTICLE = ArticleExperiments("labs.reinforcement_learning", "dynamic_programming")
 
 
 def start_of(world: World) -> int:
@@ -27,7 +27,7 @@ def start_of(world: World) -> int:
     return start
 
 
-def finite_way(world: World, steps: int) -> np.ndarray:
+def finite_horizon_path(world: World, steps: int) -> np.ndarray:
     """The cells visited with so many steps to go."""
     place = world.state.tabular_task.place
     assert isinstance(place, GridWorld)
@@ -43,16 +43,18 @@ def test_with_little_time_one_gets_close_instead_of_around(setting: Setting) -> 
     S = start_of(world)
     assert values[9, S] == pytest.approx(9 + 3.0 * 4.0)
     for steps in range(6, 11):
-        assert tuple(finite_way(world, steps)[-1]) == (3, 6), "the bottom of the sack"
-    assert tuple(finite_way(world, 11)[-1]) == (0, 8)
-    assert tuple(finite_way(world, 15)[-1]) != (3, 10)
+        assert tuple(finite_horizon_path(world, steps)[-1]) == (3, 6), "the bottom of the sack"
+    assert tuple(finite_horizon_path(world, 11)[-1]) == (0, 8)
+    assert tuple(finite_horizon_path(world, 15)[-1]) != (3, 10)
     np.testing.assert_allclose(values[16:, S], 16.0)
-    assert tuple(finite_way(world, 16)[-1]) == (3, 10)
+    assert tuple(finite_horizon_path(world, 16)[-1]) == (3, 10)
     # The walker goes where the policies lead, and takes as long.
     for _ in range(9 * 30 + 1):
         world.advance()
     assert tuple(world.state.follower.walk.at[0]) == (3, 6)
-    np.testing.assert_array_equal(world.state.follower.walk.path[:, 0], finite_way(world, 9))
+    np.testing.assert_array_equal(
+        world.state.follower.walk.path[:, 0], finite_horizon_path(world, 9)
+    )
     assert world.state.follower.walk.cost[0] == 9.0
     assert ARTICLE.answer("Little time left") == "Into the sack."
 
@@ -73,7 +75,7 @@ def test_the_wanderer_has_the_published_values(setting: Setting) -> None:
 
 @ARTICLE.verify("A wave from the goal")
 def test_values_spread_a_step_a_sweep(setting: Setting) -> None:
-    world = World(find(SLUG), setting)
+    world = World(find_lab(SLUG), setting)
     S = start_of(world)
     true_at = 0
     while world.solving:
@@ -186,7 +188,7 @@ def test_a_coarse_table_does_not_see_that_it_hangs(setting: Setting) -> None:
     world.press("push")
     assert angles(world, 6.0).min() < 0.2
     # Live, what half-made policies do while the table fills is over once it is full.
-    world = World(find(SLUG), setting)
+    world = World(find_lab(SLUG), setting)
     for _ in range(5):
         world.iterate()
         world.advance()

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from labs.reinforcement_learning.dynamic_programming.follower import (
-    LONGEST,
+    MAX_WALK_STEPS,
     MOVE,
     REST,
-    Follower,
+    PolicyFollower,
     apply_push,
     carry_over,
     follow_policy,
@@ -28,16 +28,16 @@ ROOM = tabular_task(grid_key(MAPS["room"], False, 0.0, False, 1.0, 0.9))
 PENDULUM = tabular_task(pendulum_key(21, 3, 2.5, 0.05, 0.05, 0.9))
 
 
-def followed(
-    task: TabularTask, follower: Follower, policy: np.ndarray | None, periods: int
-) -> Follower:
+def follow_for(
+    task: TabularTask, follower: PolicyFollower, policy: np.ndarray | None, periods: int
+) -> PolicyFollower:
     """So many periods later."""
     for _ in range(periods):
         follower = follow_policy(task, follower, policy, seed=0)
     return follower
 
 
-def best_way(task: TabularTask) -> tuple[np.ndarray, np.ndarray]:
+def optimal_path(task: TabularTask) -> tuple[np.ndarray, np.ndarray]:
     """An optimal policy, and the cells it leads through."""
     assert isinstance(task.place, GridWorld)
     _, best = task.solution
@@ -45,33 +45,33 @@ def best_way(task: TabularTask) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_a_walker_walks_rests_and_starts_anew() -> None:
-    best, way = best_way(ROOM)
+    best, way = optimal_path(ROOM)
     steps = len(way) - 1
     assert ROOM.mdp.terminal[ROOM.state(way[-1])]
-    at = followed(ROOM, start_follower(ROOM), best, MOVE)
+    at = follow_for(ROOM, start_follower(ROOM), best, MOVE)
     np.testing.assert_array_equal(at.walk.at[0], way[1])
-    at = followed(ROOM, at, best, MOVE * (steps - 1))
+    at = follow_for(ROOM, at, best, MOVE * (steps - 1))
     np.testing.assert_array_equal(at.walk.path[:, 0], way)
     assert at.walk.cost[0] == pytest.approx((1.0 - 0.9**steps) / 0.1)
-    at = followed(ROOM, at, best, REST - 1)
+    at = follow_for(ROOM, at, best, REST - 1)
     np.testing.assert_array_equal(at.walk.at[0], way[-1])
-    at = followed(ROOM, at, best, 2)
+    at = follow_for(ROOM, at, best, 2)
     np.testing.assert_array_equal(at.walk.at[0], way[0])
     assert (at.walk.steps, at.walk.cost[0]) == (0, 0.0)
 
 
 def test_who_gets_lost_starts_anew_and_who_has_nothing_to_do_rests() -> None:
     up = np.zeros(ROOM.mdp.X, np.int64)
-    at = followed(ROOM, start_follower(ROOM), up, LONGEST * MOVE + 1)
+    at = follow_for(ROOM, start_follower(ROOM), up, MAX_WALK_STEPS * MOVE + 1)
     assert at.resting
-    assert at.walk.steps == LONGEST
-    assert followed(ROOM, start_follower(ROOM), None, 1).resting == REST
+    assert at.walk.steps == MAX_WALK_STEPS
+    assert follow_for(ROOM, start_follower(ROOM), None, 1).resting == REST
 
 
 def test_a_fall_leads_back() -> None:
     task = tabular_task(grid_key(MAPS["cliff"], False, 0.0, False, 1.0, 1.0))
     right = np.ones(38, np.int64)
-    at = followed(task, start_follower(task), right, MOVE)
+    at = follow_for(task, start_follower(task), right, MOVE)
     np.testing.assert_array_equal(at.walk.at[0], [3, 0])
     assert at.walk.cost[0] == 100.0
 
@@ -86,7 +86,7 @@ def test_the_pendulum_holds_a_torque_for_a_time_step_and_coasts_at_rest() -> Non
         torques.append(float(at.walk.torque[0]))
     assert at.walk.steps == 5
     assert all(len(set(torques[k : k + 10])) == 1 for k in range(0, 50, 10))
-    coasting = followed(PENDULUM, start_follower(PENDULUM), None, 30)
+    coasting = follow_for(PENDULUM, start_follower(PENDULUM), None, 30)
     np.testing.assert_array_equal(coasting.walk.at, 0.0)
     pushed = apply_push(PENDULUM, at, 0)
     np.testing.assert_array_equal(pushed.walk.at[0] - at.walk.at[0], [0.0, 4.0])
@@ -113,7 +113,7 @@ def test_a_walk_goes_on_while_its_cells_are_there() -> None:
     small = tabular_task(grid_key("SG", False, 0.0, False, 1.0, 0.9))
     assert isinstance(ROOM.place, GridWorld)
     corner = ROOM.place.cells[-1:]
-    far = Follower(GridWalk(corner, corner, np.zeros(1), corner[None], MOVE))
+    far = PolicyFollower(GridWalk(corner, corner, np.zeros(1), corner[None], MOVE))
     np.testing.assert_array_equal(carry_over(small, far).walk.at[0], [0, 0])
     assert isinstance(carry_over(PENDULUM, at).walk, Swing)
 
@@ -122,11 +122,11 @@ def test_a_smaller_table_takes_over_a_swing() -> None:
     """With fewer torques and nodes, in the midst of a time step."""
     large = tabular_task(pendulum_key(21, 11, 2.5, 0.05, 0.05, 0.9))
     full = np.full(large.mdp.X, 10)
-    at = followed(large, start_follower(large), full, 15)
+    at = follow_for(large, start_follower(large), full, 15)
     assert at.walk.clock == 5
     small = tabular_task(pendulum_key(11, 3, 2.5, 0.05, 0.05, 0.9))
     kept = carry_over(small, at)
     assert kept is at
-    later = followed(small, kept, np.ones(small.mdp.X, np.int64), 10)
+    later = follow_for(small, kept, np.ones(small.mdp.X, np.int64), 10)
     assert isinstance(later.walk, Swing)
     assert later.walk.torque[0] == 0.0

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from labs.colors import NO_VALUE
-from labs.engine.catalog import find
-from labs.engine.headless import run
+from labs.engine.catalog import find_lab
+from labs.engine.headless import run_headless
 from labs.engine.run import World
 from labs.errors import LabError
 from labs.params import Value
@@ -21,14 +21,14 @@ from tests.labs.reinforcement_learning.dynamic_programming.worlds import (
     params_of,
     solved,
 )
-from tests.labs.tasks.drawn import Drawn
+from tests.labs.tasks.recording_scene import RecordingScene
 
 # Solving --------------------------------------------------------------------------------------
 
 
 def test_four_iterations_from_one_seed_reach_their_limits() -> None:
     """From initial values that the seed draws, the same for all four."""
-    one, other = (World(find(SLUG), {"spread": 20.0}, seed=seed) for seed in (1, 2))
+    one, other = (World(find_lab(SLUG), {"spread": 20.0}, seed=seed) for seed in (1, 2))
     V = one.state.iterates.V
     assert np.ptp(V, axis=0).max() == 0.0
     assert 5.0 < V.std() < 7.0
@@ -45,7 +45,7 @@ def test_four_iterations_from_one_seed_reach_their_limits() -> None:
 
 
 def test_a_kept_snapshot_shows_its_sweep_again_and_nothing_is_written_into() -> None:
-    world = World(find(SLUG), {"gamma": 0.9})
+    world = World(find_lab(SLUG), {"gamma": 0.9})
     lab, snapshots, copies = world.lab, [], []
     for snapshot in filter(None, lab.solve(world.params, world.state)):
         snapshots.append(snapshot)
@@ -60,11 +60,11 @@ def test_a_kept_snapshot_shows_its_sweep_again_and_nothing_is_written_into() -> 
 
 
 def test_solving_goes_on_from_where_the_state_is() -> None:
-    world = World(find(SLUG))
+    world = World(find_lab(SLUG))
     straight = solved({})
     for _ in range(7):
         world.iterate()
-    again = World(find(SLUG))
+    again = World(find_lab(SLUG))
     again.state = world.state
     rest = list(filter(None, again.lab.solve(again.params, world.state)))
     last = rest[-1].data["iterates"]
@@ -116,7 +116,7 @@ def test_what_has_no_value_is_left_out(shown: str) -> None:
     assert np.isnan(fields["V_map"]).all()
     for name in ("stationary", f"error_{shown}", f"backups_{shown}", "bound"):
         assert len(fields[name]) == 0, name
-    scene = Drawn()
+    scene = RecordingScene()
     world.lab.draw(scene, world.params, world.state)
     assert (scene.colors["board"][0, :2] == NO_VALUE).all()
 
@@ -212,7 +212,7 @@ def test_the_optimal_walk_keeps_the_promise() -> None:
 def test_slipping_follows_the_probabilities() -> None:
     """A wanderer's paths depend on the seed, and on nothing else."""
     ways = [
-        run(
+        run_headless(
             SLUG, {"shown": "evaluation", "slip": 0.3}, seconds=6.0, seed=seed
         ).state.follower.walk.path[:, 0]
         for seed in (0, 0, 1)

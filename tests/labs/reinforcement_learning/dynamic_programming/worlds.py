@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.params import Value
 from labs.reinforcement_learning.dynamic_programming.params import DynamicProgrammingParams
@@ -13,7 +13,7 @@ Setting = Mapping[str, Value]
 
 def solved(setting: Setting) -> World:
     """A world whose iterations are over."""
-    world = World(find(SLUG), setting)
+    world = World(find_lab(SLUG), setting)
     while world.solving:
         world.iterate()
     return world

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.scene import NullScene
-from server.camera import Drawn
+from server.camera import FrameContents
 from server.framing import Window
 
 
-class Framed(NullScene):
+class CameraScene(NullScene):
     """Keeps what a narrow window shows, and labels."""
 
     core = np.zeros((0, 3))
@@ -31,8 +31,8 @@ class Framed(NullScene):
 def test_a_narrow_window_shows_the_names_of_the_states_and_little_above(
     example: str, states: int
 ) -> None:
-    world, scene = World(find("function-approximation"), {"world": example}), Framed()
+    world, scene = World(find_lab("function-approximation"), {"world": example}), CameraScene()
     world.lab.draw(scene, world.params, world.state)
-    seen = Drawn(scene.core, scene.labels, scene.core).seen_by(Window(1.3, 300.0))
+    seen = FrameContents(scene.core, scene.labels, scene.core).visible_in(Window(1.3, 300.0))
     assert len(seen.labels) == len(scene.labels) == states
     assert scene.core[:, 2].max() < 0.7

@@ -9,27 +9,32 @@ import numpy as np
 import pytest
 
 from labs import resumable
-from labs.algorithms.approximation import best_fit
-from labs.algorithms.features import fourier, polynomials
-from labs.engine.catalog import find
+from labs.algorithms.approximation import weighted_least_squares
+from labs.algorithms.features import fourier_basis, polynomial_basis
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.lab import Snapshot
 from labs.params import Choice, Knob, Value
-from labs.reinforcement_learning.function_approximation import nine, prediction, spiral, triad
-from labs.reinforcement_learning.function_approximation.example_worlds import verdicts
+from labs.reinforcement_learning.function_approximation import (
+    convergence_table,
+    prediction,
+    spiral,
+    triad,
+)
+from labs.reinforcement_learning.function_approximation.example_worlds import convergence_labels
 from labs.reinforcement_learning.function_approximation.given_policy import (
-    PENDULUM,
-    caught_pendulum,
-    surface,
-    walk,
+    PENDULUM_GRID,
+    pendulum_policy,
+    pendulum_prediction_task,
+    walk_policy,
 )
 from labs.reinforcement_learning.function_approximation.params import ApproximationParams
-from tests.labs.contract import same
-from tests.labs.experiments import Experiments
-from tests.labs.solving import done, solved_world
+from tests.labs.contract import bitwise_equal
+from tests.labs.experiments import ArticleExperiments
+from tests.labs.solving import solved_world, stop_reason
 
 SLUG = "function-approximation"
-EXPERIMENTS = Experiments("labs.reinforcement_learning", "function_approximation")
+EXPERIMENTS = ArticleExperiments("labs.reinforcement_learning", "function_approximation")
 Settings = Mapping[str, Value]
 
 
@@ -69,7 +74,7 @@ def test_td_comes_to_its_fixed_point(setting: Settings) -> None:
     assert fixed == pytest.approx(0.117, abs=1e-3)
     assert 2.0 < fixed / best < 2.3
     assert error(world) == pytest.approx(fixed, abs=0.015)
-    given = walk("aggregation", 10)
+    given = walk_policy("aggregation", 10)
     middle = given.values(given.fixed)[1:-1]
     assert np.ptp(middle) < np.ptp(given.values(given.best)[1:-1])  # flatter
     nearer = error(world_of(setting, target="td-lambda", decay=0.9, alpha=2e-3))
@@ -83,12 +88,12 @@ def test_cosines_learn_faster_than_powers(setting: Settings) -> None:
     )
     powers = error(world_of(setting, features="polynomial", alpha=1e-4))
     assert powers == pytest.approx(0.14, abs=0.02)
-    given = walk("table", 1)
+    given = walk_policy("table", 1)
     line = np.linspace(0.0, 1.0, 1000)[:, None]
     mu, truth = given.task.weight[1:-1], given.task.truth[1:-1]
-    for make in (fourier, polynomials):
+    for make in (fourier_basis, polynomial_basis):
         phi = make(line, 5).dense
-        assert np.sqrt(mu @ (phi @ best_fit(truth, phi, mu) - truth) ** 2) < 0.01
+        assert np.sqrt(mu @ (phi @ weighted_least_squares(truth, phi, mu) - truth) ** 2) < 0.01
 
 
 @EXPERIMENTS.verify("A cliff under a soft blanket")
@@ -107,7 +112,7 @@ def test_a_few_waves_miss_where_the_truth_jumps(setting: Settings) -> None:
     )
     steep = jump > np.quantile(jump, 0.9)
     assert miss[steep].mean() > 1.8 * miss[~steep].mean()
-    tiles = surface("tiles", 10)
+    tiles = pendulum_policy("tiles", 10)
     assert tiles.error(tiles.best) == pytest.approx(0.5 * best, rel=0.1)
     assert tiles.features.size > 10 * 45
 
@@ -165,7 +170,7 @@ def test_gradient_correction_holds_the_star(setting: Settings) -> None:
     assert not world.state.trouble
     assert world.state.training["error"][:, 0] == pytest.approx(5.3, abs=0.05)
     assert error(world) == pytest.approx(1.93, abs=0.05)
-    values = world.state.training["w"] @ triad.example(_params(world)).features.dense.T
+    values = world.state.training["w"] @ triad.counterexample(_params(world)).features.dense.T
     assert np.abs(values - 0.99 * values[:, 6:]).max() < 0.1
 
 
@@ -176,7 +181,7 @@ def test_td_runs_outwards_and_monte_carlo_inwards(setting: Settings) -> None:
     assert (np.diff(world.state.training["error"].mean(axis=0)[::4]) > 0.0).all()
     inwards = world_of(setting, bootstrap=False)
     assert error(inwards) < 0.9 * 7.26
-    assert spiral.outward_threshold() == pytest.approx(0.129, abs=5e-4)
+    assert spiral.divergence_threshold() == pytest.approx(0.129, abs=5e-4)
     below = world_of(setting, gamma=0.05, updates=20_000.0).state.training
     above = world_of(setting, gamma=0.3, updates=20_000.0).state.training
     assert below["w"].mean() < 0.0 < above["w"].mean()
@@ -186,7 +191,7 @@ def test_td_runs_outwards_and_monte_carlo_inwards(setting: Settings) -> None:
 def test_three_settle_two_chatter_one_turns_three_leave(setting: Settings) -> None:
     """All nine cells of the notes' table: yes, chatters, no."""
     training = world_of(setting).state.training
-    words = np.array([said.split(":")[0] for said, _ in verdicts(training)]).reshape(3, 3)
+    words = np.array([said.split(":")[0] for said, _ in convergence_labels(training)]).reshape(3, 3)
     assert words.tolist() == [
         ["settled", "chatters", "turns on"],
         ["settled", "chatters", "left all bounds"],
@@ -205,7 +210,7 @@ def test_three_settle_two_chatter_one_turns_three_leave(setting: Settings) -> No
 @EXPERIMENTS.verify("Does the chatter fade?")
 def test_policies_go_on_changing_where_rooms_look_alike(setting: Settings) -> None:
     training = world_of(setting).state.training
-    half = int(np.searchsorted(training["steps"], nine.EPISODES / 2))
+    half = int(np.searchsorted(training["steps"], convergence_table.EPISODES / 2))
     changes = training["changes"]
     for cell in (1, 4):
         assert changes[cell, -1] - changes[cell, half] > 0.25 * changes[cell, -1]
@@ -253,22 +258,24 @@ def _params(world: World) -> ApproximationParams:
 
 def test_the_given_policy_is_judged_where_it_goes() -> None:
     """The weights of the pendulum's states are its visits: simulated anew."""
-    task, mdp, policy = caught_pendulum()
-    visits = np.zeros(PENDULUM.X)
+    task, mdp, policy = pendulum_prediction_task()
+    visits = np.zeros(PENDULUM_GRID.X)
     for start in task.task.starts:
         x = int(start)
         while not mdp.terminal[x]:
             visits[x] += 1.0
             x = int(mdp.successors[x, policy[x]])
     np.testing.assert_allclose(task.weight, visits / visits.sum(), atol=1e-12)
-    assert len(task.task.starts) > 0.95 * PENDULUM.X
+    assert len(task.task.starts) > 0.95 * PENDULUM_GRID.X
 
 
 def test_the_spiral_is_the_published_one() -> None:
     """V(w) solves dV/dw = (Q + eps I) V, and the mean step of TD(0) along it is as derived."""
     for w in (-5.0, 0.0, 3.7):
-        V, h = spiral.curve(np.array(w)), 1e-5
-        slope = (spiral.curve(np.array(w + h)) - spiral.curve(np.array(w - h))) / (2.0 * h)
+        V, h = spiral.spiral_values(np.array(w)), 1e-5
+        slope = (spiral.spiral_values(np.array(w + h)) - spiral.spiral_values(np.array(w - h))) / (
+            2.0 * h
+        )
         growth = spiral.Q + spiral.EPS * np.eye(3)
         np.testing.assert_allclose(slope, growth @ V, atol=1e-6)
         for gamma in (0.0, 0.5, 1.0):
@@ -293,12 +300,12 @@ def test_what_diverges_says_so() -> None:
     world = world_of({"alpha": 1.0, "features": "polynomial", "n": 9.0})
     assert "step size" in world.state.trouble
     assert np.isfinite(world.state.training["w"]).all()
-    assert done(world) == "The weights left all bounds."
+    assert stop_reason(world) == "The weights left all bounds."
 
 
 def begun(setting: Settings, iterations: int = 3) -> World:
     """A world that has learned a little."""
-    world = World(find(SLUG), setting)
+    world = World(find_lab(SLUG), setting)
     for _ in range(iterations):
         if world.solving:
             world.iterate()
@@ -306,7 +313,7 @@ def begun(setting: Settings, iterations: int = 3) -> World:
 
 
 SMALL = {"batch": 20.0, "passes": 5.0, "updates": 500.0, "episodes": 100.0}
-SCRAPS = {**SMALL, "world": "swing", "features": "fourier", "m": 3.0, "alpha": 0.02}
+SHORT_SWING_UP = {**SMALL, "world": "swing", "features": "fourier", "m": 3.0, "alpha": 0.02}
 
 
 @pytest.mark.parametrize(
@@ -316,8 +323,8 @@ SCRAPS = {**SMALL, "world": "swing", "features": "fourier", "m": 3.0, "alpha": 0
         ({"data": "replay"}, "batch_target"),
         ({"data": "batch"}, "batch_target"),
         ({}, "data"),
-        (SCRAPS, "data"),
-        (SCRAPS, "controller"),
+        (SHORT_SWING_UP, "data"),
+        (SHORT_SWING_UP, "controller"),
     ],
     ids=str,
 )
@@ -346,7 +353,7 @@ def test_an_oracle_fits_the_truth_where_the_batch_has_been() -> None:
     ("setting", "idle"),
     [
         ({"data": "batch"}, ("alpha", "omega", "passes", "episodes")),
-        ({**SCRAPS, "data": "batch"}, ("alpha", "omega", "passes", "episodes")),
+        ({**SHORT_SWING_UP, "data": "batch"}, ("alpha", "omega", "passes", "episodes")),
         ({"features": "table"}, ("n",)),
         ({"world": "surface", "features": "table"}, ("m",)),
         ({"world": "star", "bootstrap": False}, ("gamma", "correct", "beta")),
@@ -363,7 +370,7 @@ def test_a_knob_is_shown_where_it_acts(setting: Settings, idle: tuple[str, ...])
         tunable, value = ApproximationParams.tunables[name], getattr(world.params, name)
         other = tunable.at(0.37) if isinstance(tunable, Knob) else not value
         assert other != value
-        assert same(begun({**SMALL, **setting, name: other}).state, world.state)
+        assert bitwise_equal(begun({**SMALL, **setting, name: other}).state, world.state)
     on_policy = ApproximationParams(world="pair", bootstrap=False, off_policy=False)
     assert on_policy.acts("ending")
 
@@ -392,10 +399,10 @@ def test_no_two_of_the_nine_panels_are_the_same_curve() -> None:
     [
         ({"episodes": 20000.0, "features": "table", "target": "td-lambda"}, 50),
         ({"world": "surface", "features": "fourier", "m": 4.0, "data": "replay"}, 6),
-        ({**SCRAPS, "m": 10.0, "alpha": 0.005, "episodes": 2000.0}, 12),
+        ({**SHORT_SWING_UP, "m": 10.0, "alpha": 0.005, "episodes": 2000.0}, 12),
         (
             {
-                **SCRAPS,
+                **SHORT_SWING_UP,
                 "m": 10.0,
                 "alpha": 0.005,
                 "data": "replay",
@@ -404,7 +411,7 @@ def test_no_two_of_the_nine_panels_are_the_same_curve() -> None:
             },
             30,
         ),
-        ({**SCRAPS, "data": "batch"}, 30),
+        ({**SHORT_SWING_UP, "data": "batch"}, 30),
     ],
     ids=str,
 )
@@ -412,13 +419,13 @@ def test_long_work_pauses_and_comes_to_the_same(
     setting: Settings, pauses: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = []
-    for piece in (resumable.PIECE, 1e12):
-        monkeypatch.setattr(resumable, "PIECE", piece)
-        world = World(find(SLUG), setting)
+    for piece in (resumable.OPERATIONS_BETWEEN_PAUSES, 1e12):
+        monkeypatch.setattr(resumable, "OPERATIONS_BETWEEN_PAUSES", piece)
+        world = World(find_lab(SLUG), setting)
         for waits, snapshot in enumerate(world.lab.solve(world.params, world.state)):
             if snapshot is not None:
                 found.append((waits, snapshot.data))
                 break
     (paused, learned), (_, at_once) = found
     assert paused >= pauses
-    assert same(dict(learned), dict(at_once))
+    assert bitwise_equal(dict(learned), dict(at_once))

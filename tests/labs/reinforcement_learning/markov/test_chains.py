@@ -13,12 +13,12 @@ from labs.reinforcement_learning.markov.chains import (
     CHAINS,
     TITLES,
     chain_table,
+    format_rows,
     parse_rows,
     random_chain,
+    replace_rows,
+    set_probability,
     shift_probability,
-    with_probability,
-    with_rows,
-    write_rows,
 )
 from labs.reinforcement_learning.markov.graph import (
     bead_place,
@@ -29,12 +29,16 @@ from labs.reinforcement_learning.markov.graph import (
     state_places,
     token_place,
 )
-from labs.reinforcement_learning.markov.reward_process import Edit, RewardProcess, reward_process
+from labs.reinforcement_learning.markov.reward_process import (
+    ChainEdit,
+    RewardProcess,
+    reward_process,
+)
 
-NONE = Edit({}, 0, 0, 0.0)
+NONE = ChainEdit({}, 0, 0, 0.0)
 
 
-def process(name: str, first: float = 1.0, edit: Edit = NONE) -> RewardProcess:
+def process(name: str, first: float = 1.0, edit: ChainEdit = NONE) -> RewardProcess:
     return reward_process(chain_table(name, 1, "state, A\nA, 1"), first, edit)
 
 
@@ -76,7 +80,7 @@ def test_random_chains_are_irreducible_and_differ(states: int, number: int) -> N
 )
 def test_the_others_keep_their_proportions(weights: list[float], y: int, p: float) -> None:
     row = np.array(weights) / sum(weights)
-    new = with_probability(row, y, p, row)
+    new = set_probability(row, y, p, row)
     assert new[y] == p
     assert new.sum() == pytest.approx(1.0)
     others = np.delete(row, y)
@@ -85,12 +89,12 @@ def test_the_others_keep_their_proportions(weights: list[float], y: int, p: floa
 
 def test_one_that_had_all_gives_by_the_chains_own_proportions() -> None:
     own = np.array([0.2, 0.3, 0.5])
-    all_ = with_probability(own, 0, 1.0, own)
+    all_ = set_probability(own, 0, 1.0, own)
     np.testing.assert_array_equal(all_, [1.0, 0.0, 0.0])
-    np.testing.assert_allclose(with_probability(all_, 0, 0.2, own), own)
+    np.testing.assert_allclose(set_probability(all_, 0, 0.2, own), own)
     # Where the chain itself knew no other way, all share alike.
-    np.testing.assert_allclose(with_probability(all_, 0, 0.5, all_), [0.5, 0.25, 0.25])
-    np.testing.assert_array_equal(with_probability(np.ones(1), 0, 0.3, np.ones(1)), [1.0])
+    np.testing.assert_allclose(set_probability(all_, 0, 0.5, all_), [0.5, 0.25, 0.25])
+    np.testing.assert_array_equal(set_probability(np.ones(1), 0, 0.3, np.ones(1)), [1.0])
 
 
 def test_a_shift_reaches_never_and_always() -> None:
@@ -101,7 +105,7 @@ def test_a_shift_reaches_never_and_always() -> None:
 
 def test_rows_survive_as_text() -> None:
     rows = {4: np.array([0.0, 0.25, 0.75]), 0: np.array([1 / 3, 1 / 3, 1 / 3])}
-    text = write_rows(rows)
+    text = format_rows(rows)
     assert text == "1: 0.3333 0.3333 0.3333\n5: 0 0.25 0.75"
     for x, row in parse_rows(text).items():
         np.testing.assert_allclose(row, rows[x], atol=1e-15)
@@ -125,7 +129,7 @@ def test_a_row_said_twice_is_refused() -> None:
 def test_rows_that_do_not_fit_change_nothing() -> None:
     P = np.eye(2)
     rows = {0: np.array([0.5, 0.5]), 1: np.ones(3) / 3, 7: np.array([0.5, 0.5])}
-    np.testing.assert_array_equal(with_rows(P, rows), [[0.5, 0.5], [0.0, 1.0]])
+    np.testing.assert_array_equal(replace_rows(P, rows), [[0.5, 0.5], [0.0, 1.0]])
     np.testing.assert_array_equal(P, np.eye(2))
 
 
@@ -143,17 +147,17 @@ def test_a_policy_mixes_the_controls() -> None:
 
 def test_edits_act_where_they_fit_and_only_without_controls() -> None:
     rows = {0: np.array([0.0, 0.5, 0.5, 0.0])}
-    lights = process("lights", edit=Edit(rows, 1, 3, 0.5))
+    lights = process("lights", edit=ChainEdit(rows, 1, 3, 0.5))
     np.testing.assert_array_equal(lights.P[0], rows[0])
     np.testing.assert_allclose(lights.P[1], [0.0, 0.0, 0.5, 0.5])
     np.testing.assert_array_equal(lights.unedited, process("lights").P)
-    assert lights.beads(1, 0) == [0, 2, 3]
-    for edit in (Edit(rows, 9, 1, 0.5), Edit(rows, 1, 9, 0.5)):
+    assert lights.bead_targets(1, 0) == [0, 2, 3]
+    for edit in (ChainEdit(rows, 9, 1, 0.5), ChainEdit(rows, 1, 9, 0.5)):
         np.testing.assert_array_equal(process("student", edit=edit).P, process("student").P)
-    edit = Edit({0: np.array([0.0, 0.0, 1.0])}, 0, 1, 1.0)
+    edit = ChainEdit({0: np.array([0.0, 0.0, 1.0])}, 0, 1, 1.0)
     np.testing.assert_array_equal(process("machine", edit=edit).P, process("machine").P)
-    assert process("machine").beads(0, 1) == []
-    assert process("student").beads(9, 1) == []
+    assert process("machine").bead_targets(0, 1) == []
+    assert process("student").bead_targets(9, 1) == []
 
 
 def test_states_that_are_left_for_good() -> None:

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from labs.engine.catalog import find
-from labs.engine.headless import run
+from labs.engine.catalog import find_lab
+from labs.engine.headless import run_headless
 from labs.engine.run import World
 from labs.errors import ParameterError
 from labs.lab import Inputs
@@ -19,10 +19,10 @@ from labs.reinforcement_learning.markov.params import MAX_SHOWN_STATES, MarkovPa
 from labs.reinforcement_learning.markov.plots import GAMMAS
 from labs.reinforcement_learning.markov.reward_process import RewardProcess
 from labs.scene import NullScene
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 
 LAB = Markov()
-ARTICLE = Experiments("labs.reinforcement_learning", "markov")
+ARTICLE = ArticleExperiments("labs.reinforcement_learning", "markov")
 
 
 def params_of(world: World) -> MarkovParams:
@@ -35,9 +35,9 @@ def process_of(world: World) -> RewardProcess:
     return params_of(world).process
 
 
-def walked(setting: Mapping[str, Value], steps: int, seed: int = 0) -> World:
+def walk_steps(setting: Mapping[str, Value], steps: int, seed: int = 0) -> World:
     """A world whose token has gone so many steps, and half of the next."""
-    world = World(find("markov"), setting, seed)
+    world = World(find_lab("markov"), setting, seed)
     params = params_of(world)
     for _ in range(round((steps + 0.5) / params.pace / LAB.period)):
         world.state = LAB.step(params, Inputs(), world.state)
@@ -52,7 +52,7 @@ def field_names(world: World) -> dict[str, np.ndarray]:
     return dict(LAB.fields(params_of(world), world.state))
 
 
-def said(world: World) -> str:
+def notes_text(world: World) -> str:
     return "\n".join(LAB.notes(params_of(world), world.state).values())
 
 
@@ -61,7 +61,7 @@ def said(world: World) -> str:
 
 @ARTICLE.verify("Where the weeks go")
 def test_where_the_weeks_go(setting: Mapping[str, Value]) -> None:
-    early, late = walked({**setting, "pace": 5.0}, 15), walked(setting, 10_000)
+    early, late = walk_steps({**setting, "pace": 5.0}, 15), walk_steps(setting, 10_000)
     now = measured(early)
     assert now["steps"] == 15
     assert now["off"] < 0.2
@@ -81,27 +81,27 @@ def test_where_the_weeks_go(setting: Mapping[str, Value]) -> None:
 
 @ARTICLE.verify("Round and round")
 def test_round_and_round(setting: Mapping[str, Value]) -> None:
-    world = walked(setting, 11)
+    world = walk_steps(setting, 11)
     fields = field_names(world)
     found = fields["re"] + 1j * fields["im"]
     for root in (1, 1j, -1, -1j):
         assert np.abs(found - root).min() < 1e-12
     assert sorted(fields["mu"]) == [0.0, 0.0, 0.0, 1.0]
     np.testing.assert_allclose(fields["far"], 0.25)
-    assert "multiples of 4 steps" in said(world)
-    assert measured(walked({**setting, "pace": 50.0}, 400))["visits_off"] < 0.5
+    assert "multiples of 4 steps" in notes_text(world)
+    assert measured(walk_steps({**setting, "pace": 50.0}, 400))["visits_off"] < 0.5
     assert ARTICLE.answer("Round and round") == "It goes round for ever."
 
 
 @ARTICLE.verify("A little hesitation")
 def test_a_little_hesitation(setting: Mapping[str, Value]) -> None:
-    now = measured(walked(setting, 60))
+    now = measured(walk_steps(setting, 60))
     assert now["second"] == pytest.approx(0.943, abs=5e-4)
     assert now["steps"] == 60
     assert now["off"] < 1.5
     np.testing.assert_allclose(now["far"], [0.294, 0.235, 0.235, 0.235], atol=5e-4)
-    assert "Aperiodic" in said(walked(setting, 1))
-    assert "Periodic" in said(walked({**setting, "shift": 0.0}, 1))
+    assert "Aperiodic" in notes_text(walk_steps(setting, 1))
+    assert "Periodic" in notes_text(walk_steps({**setting, "shift": 0.0}, 1))
     assert ARTICLE.answer("A little hesitation") == "Everything: it settles."
 
 
@@ -109,7 +109,7 @@ def test_a_little_hesitation(setting: Mapping[str, Value]) -> None:
 def test_one_way_doors(setting: Mapping[str, Value]) -> None:
     desks, runs = 0, 40
     for seed in range(runs):
-        world = walked(setting, 200, seed)
+        world = walk_steps(setting, 200, seed)
         visits = world.state.walk.visits
         at_desk, at_clock = visits[1:3].any(), visits[3:].any()
         assert at_desk != at_clock
@@ -137,7 +137,7 @@ def test_myopic_or_far_sighted(setting: Mapping[str, Value]) -> None:
     assert V(0.978)[0] < V(0.978)[3]
     for gamma in (0.979, setting["gamma"]):
         assert V(float(gamma))[3] < V(float(gamma))[0]
-    fields = field_names(run("markov", setting, seconds=0.0))
+    fields = field_names(run_headless("markov", setting, seconds=0.0))
     means = fields["means"]
     np.testing.assert_allclose(means[0], V(0.0), atol=1e-12)
     assert (GAMMAS[0], GAMMAS[-1]) == (0.0, 1.0)
@@ -147,7 +147,7 @@ def test_myopic_or_far_sighted(setting: Mapping[str, Value]) -> None:
 
 @ARTICLE.verify("No end, no sum")
 def test_no_end_no_sum(setting: Mapping[str, Value]) -> None:
-    world = World(find("markov"), setting)
+    world = World(find_lab("markov"), setting)
     values = []
     while world.solving:
         world.iterate()
@@ -155,8 +155,8 @@ def test_no_end_no_sum(setting: Mapping[str, Value]) -> None:
     np.testing.assert_allclose(values[-1] - values[-2], -0.412, atol=5e-4)
     assert world.latest is not None
     assert world.latest.done == "Stopped at k = 200: V has no limit."
-    assert "I − P is singular" in said(world)
-    assert "costs −0.412 on average" in said(world)
+    assert "I − P is singular" in notes_text(world)
+    assert "costs −0.412 on average" in notes_text(world)
     process = process_of(world)
     assert np.linalg.matrix_rank(np.eye(6) - process.P) == 5
     assert "value" not in measured(world)
@@ -167,20 +167,20 @@ def test_no_end_no_sum(setting: Mapping[str, Value]) -> None:
 
 @ARTICLE.verify("The last week")
 def test_the_last_week(setting: Mapping[str, Value]) -> None:
-    world = run("markov", setting, seconds=0.0)
+    world = run_headless("markov", setting, seconds=0.0)
     fields, P = field_names(world), process_of(world).P
     np.testing.assert_allclose(fields["exact"][[0, 4]], [-4.93, 5.32], atol=5e-3)
     np.testing.assert_allclose(fields["V"], fields["exact"], atol=1e-8)
     assert fields["exact"][5] == 0.0
     assert np.linalg.matrix_rank(np.eye(6) - P) == 5
     assert np.linalg.matrix_rank(np.eye(5) - P[:5, :5]) == 5
-    assert "V exists all the same" in said(world)
+    assert "V exists all the same" in notes_text(world)
     assert ARTICLE.answer("The last week") == "Yes."
 
 
 @ARTICLE.verify("How long will a gambler last?")
 def test_how_long_will_a_gambler_last(setting: Mapping[str, Value]) -> None:
-    world = run("markov", setting, seconds=0.0)
+    world = run_headless("markov", setting, seconds=0.0)
     states = process_of(world).table.states
     V = dict(zip(states, field_names(world)["exact"], strict=True))
     expected = {"2 coins": 4.0, "3 coins": 3.0, "1 coin": 3.0, "Broke": 0.0, "Rich": 0.0}
@@ -193,11 +193,11 @@ def test_how_long_will_a_gambler_last(setting: Mapping[str, Value]) -> None:
 
 @ARTICLE.verify("Never mend a running machine?")
 def test_never_mend_a_running_machine(setting: Mapping[str, Value]) -> None:
-    Q = field_names(run("markov", setting, seconds=0.0))["Q"]
+    Q = field_names(run_headless("markov", setting, seconds=0.0))["Q"]
     expected = [[35.9, 36.3], [49.1, 37.5], [60.0, 46.2]]
     np.testing.assert_allclose(Q, expected, atol=0.051)
     assert Q.argmin(axis=1).tolist() == [0, 1, 1]
-    myopic = field_names(run("markov", {**setting, "gamma": 0.4}, seconds=0.0))["Q"]
+    myopic = field_names(run_headless("markov", {**setting, "gamma": 0.4}, seconds=0.0))["Q"]
     assert myopic.argmin(axis=1).tolist() == [0, 0, 1]
     assert ARTICLE.answer("Never mend a running machine?") == "Where it is worn or broken."
 
@@ -211,7 +211,7 @@ def test_every_experiment_is_verified() -> None:
 
 def begun(setting: Mapping[str, Value] | None = None) -> World:
     """A world whose V is solved and whose time stands at 0."""
-    world = World(find("markov"), setting)
+    world = World(find_lab("markov"), setting)
     while world.solving:
         world.iterate()
     return world
@@ -353,7 +353,7 @@ def test_the_errors_begin_at_zero_iterations_whenever_something_is_turned() -> N
 
 def test_a_snapshot_alone_shows_its_iteration() -> None:
     """Looking back: any of them, accepted into any state, gives the same V and errors."""
-    world = World(find("markov"))
+    world = World(find_lab("markov"))
     params = params_of(world)
     snapshots = list(LAB.solve(params, world.state))
     tenth = LAB.accept(params, world.state, snapshots[9])

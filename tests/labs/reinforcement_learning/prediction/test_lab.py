@@ -5,15 +5,15 @@ What a hundred learners do on average is a statistic: tolerances are about three
 import numpy as np
 import pytest
 
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.reinforcement_learning.prediction.lab import PredictionLab
 from labs.reinforcement_learning.prediction.params import PredictionParams
 from labs.reinforcement_learning.prediction.targets import sample_targets
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 from tests.labs.solving import Settings, readouts, solved_world
 
-EXPERIMENTS = Experiments("labs.reinforcement_learning", "prediction")
+EXPERIMENTS = ArticleExperiments("labs.reinforcement_learning", "prediction")
 SQRT_LEARNERS = 10.0
 
 
@@ -27,7 +27,7 @@ def numbers(setting: Settings, **changes: float | str | bool) -> dict[str, float
 
 @EXPERIMENTS.verify("Before it is over")
 def test_only_td_learns_before_the_end(setting: Settings) -> None:
-    world, steps = World(find("prediction"), setting), 0
+    world, steps = World(find_lab("prediction"), setting), 0
     while world.state.live.episodes == 0:
         V = world.state.live.V
         assert not V[0].any()

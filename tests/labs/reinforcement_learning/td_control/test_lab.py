@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labs.algorithms.policy_evaluation import exact
-from labs.engine.catalog import find
+from labs.algorithms.policy_evaluation import exact_values
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.errors import ParameterError
 from labs.lab import Snapshot
@@ -22,10 +22,10 @@ from labs.reinforcement_learning.td_control.training import train
 from labs.scene import NullScene
 from labs.tasks.grid_world.map import MAPS, GridWorld
 from labs.tasks.grid_world.picture import board
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 
-EXPERIMENTS = Experiments("labs.reinforcement_learning", "td_control")
-ENTRY = find("td-control")
+EXPERIMENTS = ArticleExperiments("labs.reinforcement_learning", "td_control")
+ENTRY = find_lab("td-control")
 LAB = TdControl()
 
 
@@ -45,7 +45,7 @@ def params_of(world: World) -> TdParams:
     return world.params
 
 
-def paid(world: World, part: slice = slice(BATCHES // 2, None)) -> np.ndarray:
+def training_cost(world: World, part: slice = slice(BATCHES // 2, None)) -> np.ndarray:
     """(M,) mean cost of an episode while learning; of the training's second half."""
     mean: np.ndarray = world.state.training["online"][:, :, part].mean(axis=(1, 2))
     return mean
@@ -77,18 +77,18 @@ def test_on_and_off_policy_part_at_the_cliff(setting: Mapping[str, Value]) -> No
     assert (q_learning == 13.0).all()
     assert np.median(sarsa) == 17.0
     assert (sarsa > 13.0).all()
-    assert paid(world) == pytest.approx([50, 27], abs=3.0)
+    assert training_cost(world) == pytest.approx([50, 27], abs=3.0)
     assert EXPERIMENTS.answer("Along the edge or not") == "SARSA, off the edge."
 
 
 @EXPERIMENTS.verify("Look where you know little")
 def test_a_confidence_bound_explores_cheaply(setting: Mapping[str, Value]) -> None:
     assert setting["map"] == MAPS["windy"] + "\n"
-    assert paid(world_of(setting)) == pytest.approx([15, 15], abs=0.05)
+    assert training_cost(world_of(setting)) == pytest.approx([15, 15], abs=0.05)
     assert EXPERIMENTS.answer("Look where you know little") == 15
-    dice = paid(world_of(setting, explorer="epsilon-greedy"))
+    dice = training_cost(world_of(setting, explorer="epsilon-greedy"))
     assert dice == pytest.approx([17, 21], abs=0.7)
-    wide = paid(world_of(setting, bound=10.0))
+    wide = training_cost(world_of(setting, bound=10.0))
     assert (wide > dice - 4.0).all()
     assert wide[0] > 25.0
 
@@ -105,8 +105,8 @@ def test_optimism_explores(setting: Mapping[str, Value]) -> None:
 @EXPERIMENTS.verify("Explore less and less")
 def test_fading_exploration_dares_more(setting: Mapping[str, Value]) -> None:
     world = world_of(setting)
-    assert paid(world)[1] == pytest.approx(14.5, abs=0.7)
-    assert paid(world_of(setting, fading=0.0))[1] == pytest.approx(28, abs=1.5)
+    assert training_cost(world)[1] == pytest.approx(14.5, abs=0.7)
+    assert training_cost(world_of(setting, fading=0.0))[1] == pytest.approx(28, abs=1.5)
     assert np.median(greedy(world)[1]) == 15.0
     assert EXPERIMENTS.answer("Explore less and less") == "Yes."
 
@@ -135,8 +135,8 @@ def test_lambda_zero_is_sarsa(setting: Mapping[str, Value]) -> None:
 @EXPERIMENTS.verify("News travels")
 def test_a_memory_learns_faster_at_first(setting: Mapping[str, Value]) -> None:
     world = world_of(setting)
-    assert paid(world, slice(0, 25)) == pytest.approx([85, 132], abs=12.0)
-    late = paid(world, slice(150, None))
+    assert training_cost(world, slice(0, 25)) == pytest.approx([85, 132], abs=12.0)
+    late = training_cost(world, slice(150, None))
     assert late[0] > late[1], "and pays more later"
     assert EXPERIMENTS.answer("News travels") == "Yes, in the first episodes."
 
@@ -166,10 +166,12 @@ def test_a_goal_close_by_is_found_at_once(setting: Mapping[str, Value]) -> None:
             assert np.median(again) <= 3
             assert np.median(fresh[cell]) == pytest.approx(60, abs=15)
         else:
-            pulled = paid(moved, slice(-BATCHES, -BATCHES + 20))[0]
+            pulled = training_cost(moved, slice(-BATCHES, -BATCHES + 20))[0]
             assert np.median(again) > 10
             assert (
-                pulled > 2 * paid(world_of({**setting, "map": params_of(moved).map}), slice(20))[0]
+                pulled
+                > 2
+                * training_cost(world_of({**setting, "map": params_of(moved).map}), slice(20))[0]
             )
     assert EXPERIMENTS.answer("Move the goal") == "It depends on where it goes."
 
@@ -209,8 +211,11 @@ def test_the_pupil_surpasses_its_teacher(setting: Mapping[str, Value]) -> None:
     task = params_of(blind).task
     x, total, discount = task.start, 0.0, 1.0
     while discount > 1e-12:
-        total += discount * task.mdp.C[x, task.teacher[x]]
-        x, discount = int(task.mdp.successors[x, task.teacher[x]]), discount * task.mdp.gamma
+        total += discount * task.mdp.C[x, task.reference_policy[x]]
+        x, discount = (
+            int(task.mdp.successors[x, task.reference_policy[x]]),
+            discount * task.mdp.gamma,
+        )
     assert total == pytest.approx(14.6, abs=0.05)
     assert greedy(blind)[0] == pytest.approx(np.full(5, total), abs=1e-9)
     assert np.median(greedy(world_of(setting, q0=0.0))) == pytest.approx(17, abs=0.6)
@@ -345,7 +350,7 @@ def test_on_thin_ice_one_walks_into_the_edge(setting: Mapping[str, Value]) -> No
     assert LAB.measure(params_of(world), world.state)["optimum"] == pytest.approx(-0.542, abs=5e-4)
     policies = world.state.training["q"][0].argmin(axis=2)
     assert (policies[:, task.start] == left).all()
-    worth = np.sort([-exact(task.mdp, policy)[task.start] for policy in policies])
+    worth = np.sort([-exact_values(task.mdp, policy)[task.start] for policy in policies])
     assert worth[5] > 0.525, "at least five"
     assert worth[-1] <= best.max() + 1e-12
     assert EXPERIMENTS.answer("Thin ice") == "Left, into the edge."

@@ -8,7 +8,7 @@ from labs.reinforcement_learning.td_control.tasks import (
     KD,
     KP,
     LARGEST_GAMMA,
-    PENDULUM,
+    PENDULUM_GRID,
     ControlTask,
     grid_task,
     pendulum_task,
@@ -45,7 +45,7 @@ def test_the_cautious_controller_takes_seventeen_steps_past_the_cliff() -> None:
     task = grid_task(MAPS["cliff"], False, 0.0, False, 1.0, 1.0, False)
     x, cost = task.start, 0.0
     while not task.mdp.terminal[x]:
-        u = task.teacher[x]
+        u = task.reference_policy[x]
         cost += task.mdp.C[x, u]
         x = int(task.mdp.successors[x, u])
     assert cost == 17.0
@@ -53,26 +53,26 @@ def test_the_cautious_controller_takes_seventeen_steps_past_the_cliff() -> None:
 
 def test_the_cautious_controller_gives_way_to_walls() -> None:
     task = grid_task("..G\n.#.\nS..", False, 0.0, False, 1.0, 1.0, False)
-    assert task.teacher[GridWorld.parse("..G\n.#.\nS..").state((2, 1))] == 1, (
+    assert task.reference_policy[GridWorld.parse("..G\n.#.\nS..").state((2, 1))] == 1, (
         "under the wall it goes aside"
     )
-    assert task.teacher[task.start] == 0
+    assert task.reference_policy[task.start] == 0
 
 
 def test_pd_control_takes_the_level_nearest_to_its_torque() -> None:
     task = pendulum_task(0.9, 0.05, False)
     for q, v in ((np.pi, 0.0), (np.pi - 0.1, 0.0), (np.pi, 2.0), (1.0, 0.0)):
-        x = int(PENDULUM.state(np.array([q]), np.array([v])))
-        node_q, node_v = PENDULUM.nodes[x]
+        x = int(PENDULUM_GRID.state(np.array([q]), np.array([v])))
+        node_q, node_v = PENDULUM_GRID.nodes[x]
         wanted = np.clip(KP * (np.pi - node_q) - KD * node_v, -2.5, 2.5)
-        assert abs(PENDULUM.torques[task.teacher[x], 0] - wanted) <= 0.625 + 1e-9
+        assert abs(PENDULUM_GRID.torques[task.reference_policy[x], 0] - wanted) <= 0.625 + 1e-9
 
 
 def test_the_pendulum_lies_on_its_map_with_angles_along_the_rows() -> None:
     task = pendulum_task(0.9, 0.05, False)
-    q, v = PENDULUM.nodes.T
-    np.testing.assert_allclose(task.on_map(q), np.tile(np.pi + PENDULUM.angles, (31, 1)))
-    np.testing.assert_allclose(task.on_map(v), np.tile(PENDULUM.velocities[:, None], (1, 41)))
+    q, v = PENDULUM_GRID.nodes.T
+    np.testing.assert_allclose(task.on_map(q), np.tile(np.pi + PENDULUM_GRID.angles, (31, 1)))
+    np.testing.assert_allclose(task.on_map(v), np.tile(PENDULUM_GRID.velocities[:, None], (1, 41)))
     assert task.on_map(np.arange(task.mdp.X))[tuple(task.cells[7])] == 7
 
 

@@ -11,29 +11,29 @@ import numpy as np
 import pytest
 
 from labs.algorithms import prediction
-from labs.engine.catalog import find
+from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.errors import ParameterError
 from labs.lab import Inputs
 from labs.params import Value
 from labs.reinforcement_learning.td_lambda.lab import TdLambda
-from labs.reinforcement_learning.td_lambda.live import (
+from labs.reinforcement_learning.td_lambda.params import METHOD_NUMBERS, TD_METHODS, TdLambdaParams
+from labs.reinforcement_learning.td_lambda.partial_episode import (
     PartialEpisode,
-    credit,
     draw_episode,
-    learned,
+    eligibility,
     n_step_returns,
     return_weights,
+    updated_values,
 )
-from labs.reinforcement_learning.td_lambda.params import NUMBERS, TD_METHODS, TdLambdaParams
-from labs.reinforcement_learning.td_lambda.sweep import ALPHAS, DECAYS, STEPS
+from labs.reinforcement_learning.td_lambda.sweep import ALPHAS, LAMBDA_VALUES, N_VALUES
 from labs.tasks.grid_world.map import MAPS, grid_world
 from labs.tasks.grid_world.picture import board
-from tests.labs.experiments import Experiments
+from tests.labs.experiments import ArticleExperiments
 from tests.labs.solving import readouts, solve, solved_world
 
-EXPERIMENTS = Experiments("labs.reinforcement_learning", "td_lambda")
-ENTRY = find("td-lambda")
+EXPERIMENTS = ArticleExperiments("labs.reinforcement_learning", "td_lambda")
+ENTRY = find_lab("td-lambda")
 LAB = TdLambda()
 NEAR = 0.012
 """Three standard errors of a mean of 100 learners, and more."""
@@ -50,7 +50,7 @@ def curves(world: World, part: str) -> np.ndarray:
     return errors
 
 
-def least(world: World) -> np.ndarray:
+def least_errors(world: World) -> np.ndarray:
     """(k,) the least error of each curve of the family."""
     return np.asarray(curves(world, "family").min(axis=1))
 
@@ -69,7 +69,7 @@ def walked(setting: Mapping[str, Value], episodes: int, **changes: Value) -> Wor
 @EXPERIMENTS.verify("Neither end is best")
 def test_an_intermediate_n_is_best(setting: Mapping[str, Value]) -> None:
     world = solved_world("td-lambda", setting)
-    best, shown = dict(zip(STEPS, least(world), strict=True)), readouts(world)
+    best, shown = dict(zip(N_VALUES, least_errors(world), strict=True)), readouts(world)
     assert shown["best_member"] == 4.0 == setting["n"]
     assert shown["best_alpha"] == pytest.approx(0.4, abs=0.05)
     assert best[4] == shown["best_error"] == pytest.approx(0.27, abs=NEAR)
@@ -96,15 +96,15 @@ def test_weights_sum_to_one_and_seven_have_half(setting: Mapping[str, Value]) ->
 @EXPERIMENTS.verify("No need to choose")
 def test_an_intermediate_lambda_is_as_good_as_the_best_n(setting: Mapping[str, Value]) -> None:
     world = solved_world("td-lambda", setting)
-    best, shown = dict(zip(DECAYS, least(world), strict=True)), readouts(world)
+    best, shown = dict(zip(LAMBDA_VALUES, least_errors(world), strict=True)), readouts(world)
     assert (shown["best_member"], shown["best_alpha"]) == pytest.approx((0.8, 0.4), abs=0.051)
     assert best[0.8] == pytest.approx(0.27, abs=NEAR)
     assert (best[0.0], best[1.0]) == pytest.approx((0.37, 0.49), abs=NEAR)
     n_step = solved_world("td-lambda", {"method": "n-step"})
-    assert best[0.8] == pytest.approx(least(n_step).min(), abs=0.005)
+    assert best[0.8] == pytest.approx(least_errors(n_step).min(), abs=0.005)
     assert EXPERIMENTS.answer("No need to choose") == "Yes, it is about as good."
     longer = solved_world("td-lambda", {**setting, "episodes": 40.0})
-    assert least(longer).argmin() == least(world).argmin()
+    assert least_errors(longer).argmin() == least_errors(world).argmin()
     minima = [curves(w, "family").argmin(axis=1) for w in (longer, world)]
     assert (minima[0] <= minima[1]).all(), "who has time takes smaller steps"
     assert (minima[0] < minima[1]).sum() >= 7
@@ -163,21 +163,21 @@ def test_true_online_bears_large_steps(setting: Mapping[str, Value]) -> None:
     assert traces[ALPHAS >= 0.8].min() > 2.0, "some leave all bounds"
     at = int(online.argmin())
     assert online[np.isclose(ALPHAS, 2 * ALPHAS[at])][0] < online[at] + 0.05
-    others = [least(solved_world("td-lambda", {"method": m})).min() for m in
+    others = [least_errors(solved_world("td-lambda", {"method": m})).min() for m in
               ("n-step", "forward", "backward")]  # fmt: skip
-    assert least(world).min() == pytest.approx(0.259, abs=NEAR)
+    assert least_errors(world).min() == pytest.approx(0.259, abs=NEAR)
     assert min(others) == pytest.approx(0.266, abs=NEAR)
-    assert least(world).min() < min(others)
+    assert least_errors(world).min() < min(others)
     assert EXPERIMENTS.answer("Traces that know the step size") == "Only true online learns."
 
 
 @EXPERIMENTS.verify("A long way to tell")
 def test_bias_hurts_where_every_step_costs(setting: Mapping[str, Value]) -> None:
     world = solved_world("td-lambda", setting)
-    place, best = params_of(world).place, dict(zip(DECAYS, least(world), strict=True))
-    assert place.steps == pytest.approx(32, abs=0.5)
-    assert place.steps == pytest.approx(place.task.truth[place.start])
-    assert place.untrained == pytest.approx(19.1, abs=0.05)
+    place, best = params_of(world).place, dict(zip(LAMBDA_VALUES, least_errors(world), strict=True))
+    assert place.mean_steps == pytest.approx(32, abs=0.5)
+    assert place.mean_steps == pytest.approx(place.task.truth[place.start])
+    assert place.initial_error == pytest.approx(19.1, abs=0.05)
     assert (best[0.975], best[0.8], best[0.0]) == pytest.approx((5.9, 8.9, 15.0), abs=0.25)
     assert readouts(world)["best_member"] > 0.9
     assert setting["lam"] == 0.95
@@ -213,10 +213,10 @@ def test_walking_learns_what_the_algorithms_learn(method: str, offline: bool, sy
             states=np.r_[steps.states[: half.done + 1], np.full(5, place.start)],
             costs=np.r_[steps.costs[: half.done], np.full(5, 99.0)],
         )
-        now = learned(place, method, rule, V, half)
-        assert np.array_equal(now, learned(place, method, rule, V, other))
-        V = learned(place, method, rule, V, steps._replace(done=len(steps.costs)))
-    after = prediction.step(place.task, rule, NUMBERS[method], learners, 3)
+        now = updated_values(place, method, rule, V, half)
+        assert np.array_equal(now, updated_values(place, method, rule, V, other))
+        V = updated_values(place, method, rule, V, steps._replace(done=len(steps.costs)))
+    after = prediction.step(place.task, rule, METHOD_NUMBERS[method], learners, 3)
     assert np.array_equal(V, after.V[0])
 
 
@@ -226,11 +226,11 @@ def test_n_step_td_learns_as_its_costs_come() -> None:
     steps = PartialEpisode(np.array([10, 9, 8, 9, 0]), np.array([1.0, 2.0, 3.0, 4.0]))
     V = np.where(np.arange(21) % 20 == 0, 0.0, 0.1 * np.arange(21))
     moved = [
-        np.flatnonzero(learned(params.place, "n-step", params.rule("n-step"), V, done) != V)
+        np.flatnonzero(updated_values(params.place, "n-step", params.rule("n-step"), V, done) != V)
         for done in (steps._replace(done=t) for t in range(5))
     ]
     assert [m.tolist() for m in moved] == [[], [], [10], [9, 10], [8, 9, 10]]
-    after = learned(params.place, "n-step", params.rule("n-step"), V, steps._replace(done=2))
+    after = updated_values(params.place, "n-step", params.rule("n-step"), V, steps._replace(done=2))
     assert after[10] == pytest.approx(1.0 + 0.5 * (1.0 + 2.0 + 0.8 - 1.0))
 
 
@@ -240,14 +240,14 @@ def test_the_credit_of_every_step_adds_up_to_the_update(method: str, gamma: floa
     """Offline, V changes by alpha times the sum over all steps of delta_t e_t, by any method."""
     params = some_params(method=method, offline=True, gamma=gamma, lam=0.7, n=3, alpha=0.1)
     place, rule = params.place, params.rule(method)
-    V = np.random.default_rng(1).uniform(-1.0, 1.0, 21) * place.inside
+    V = np.random.default_rng(1).uniform(-1.0, 1.0, 21) * place.nonterminal
     steps = draw_episode(place, np.arange(1, 5, dtype=np.uint64))
     total = np.zeros(21)
     for t, cost in enumerate(steps.costs):
         x, y = steps.states[t : t + 2]
-        e = credit(gamma, method, rule, steps._replace(done=t + 1), 21)
+        e = eligibility(gamma, method, rule, steps._replace(done=t + 1), 21)
         total += (cost + gamma * V[y] - V[x]) * e
-    after = learned(place, method, rule, V, steps._replace(done=len(steps.costs)))
+    after = updated_values(place, method, rule, V, steps._replace(done=len(steps.costs)))
     assert after - V == pytest.approx(0.1 * total, abs=1e-12)
 
 
@@ -255,8 +255,8 @@ def test_the_trace_of_true_online_is_its_update_before_anything_was_learned() ->
     params = some_params(method="true-online", lam=0.9, alpha=0.5)
     steps = draw_episode(params.place, np.arange(1, 5, dtype=np.uint64))
     steps = steps._replace(done=len(steps.costs))
-    V = learned(params.place, "true-online", params.rule("true-online"), np.zeros(21), steps)
-    e = credit(1.0, "true-online", params.rule("true-online"), steps, 21)
+    V = updated_values(params.place, "true-online", params.rule("true-online"), np.zeros(21), steps)
+    e = eligibility(1.0, "true-online", params.rule("true-online"), steps, 21)
     assert pytest.approx(0.5 * steps.costs[-1] * e) == V
     assert e.max() <= 1.0 / 0.5
 
@@ -273,9 +273,9 @@ def test_weights_and_returns_make_the_target(method: str, ahead: int) -> None:
     if 0 < ahead < 10 and method != "true-online":
         states = np.r_[np.arange(10, 10 - ahead, -1), 0]
         steps = PartialEpisode(states, np.arange(1.0, ahead + 1.0), ahead)
-        V = np.linspace(0.0, 1.0, 21) * place.inside
+        V = np.linspace(0.0, 1.0, 21) * place.nonterminal
         returns = n_step_returns(0.9, V, steps)
-        target = learned(place, method, rule, V, steps)[10]
+        target = updated_values(place, method, rule, V, steps)[10]
         assert weights @ returns == pytest.approx(target)
 
 

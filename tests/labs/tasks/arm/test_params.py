@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labs.models.arms import load
+from labs.models.arms import load_arm
 from labs.params import Choice, Group, Params
 from labs.tasks.arm.params import joint_values, offset_knob, robot_choice
 from labs.tasks.arm.postures import POSED_ARMS
@@ -29,7 +29,7 @@ def test_values_are_read_in_order() -> None:
 def test_an_arm_is_chosen_by_its_title() -> None:
     robot = ArmParams.tunables["robot"]
     assert isinstance(robot, Choice)
-    assert robot.options == {name: load(name).title for name in POSED_ARMS}
+    assert robot.options == {name: load_arm(name).title for name in POSED_ARMS}
     assert (ArmParams().robot, robot.effect) == ("ur5", "restart")
 
 

@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 from labs.errors import LabError
-from labs.models.arms import load
+from labs.models.arms import load_arm
 from labs.models.plant import plant
 from labs.tasks.arm.postures import POSED_ARMS, POSTURES, posture
 
@@ -14,7 +14,7 @@ EVERY = [(robot, name) for robot in POSED_ARMS for name in POSTURES]
 
 @pytest.mark.parametrize(("robot", "name"), EVERY)
 def test_it_is_within_reach_and_above_the_floor(robot: str, name: str) -> None:
-    q, arm = posture(robot, name), load(robot)
+    q, arm = posture(robot, name), load_arm(robot)
     assert q.shape == (arm.model.nq,)
     if robot != "double-pendulum":
         assert (q >= arm.model.lowerPositionLimit - 1e-3).all()

@@ -9,14 +9,20 @@ from labs.algorithms import sqp
 from labs.algorithms.collocation import Collocation
 from labs.models.mechanisms import mechanism
 from labs.scene import NullScene
-from labs.tasks.direct.guesses import first_guess, resampled
-from labs.tasks.direct.history import ARC_POINTS, KEPT, IterationHistory
+from labs.tasks.direct.guesses import first_guess, resample_motion
+from labs.tasks.direct.history import ARC_POINTS, KEPT_PATHS, IterationHistory
 from labs.tasks.direct.params import GUESSES, DirectParams
-from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots, joined
+from labs.tasks.direct.picture import draw_goal, draw_paths, draw_robots, join_pieces
 from labs.tasks.direct.plan_params import SOFT_WEIGHT
-from labs.tasks.direct.player import DirectState, advanced, dragged, measured, replayed
-from labs.tasks.direct.systems import TITLES, reaching_posture, system
-from labs.tasks.direct.tracking import playable
+from labs.tasks.direct.player import (
+    DirectState,
+    advance_player,
+    edit_balls,
+    measure_player,
+    play_motion,
+)
+from labs.tasks.direct.systems import TASK_TITLES, reaching_posture, rest_to_rest_task
+from labs.tasks.direct.tracking import nominal_trajectory
 from labs.tasks.direct.trajectory import PiecewiseTrajectory
 from labs.tasks.motion.playback import FEEDBACK, OPEN_LOOP, start_playback
 
@@ -43,7 +49,7 @@ def test_a_cubic_is_interpolated_exactly() -> None:
     np.testing.assert_allclose(motion.state(0.125), 0.5 * (motion.X[0] + motion.X[1]))
 
 
-@pytest.mark.parametrize("system", TITLES)
+@pytest.mark.parametrize("system", TASK_TITLES)
 @pytest.mark.parametrize("guess", GUESSES)
 def test_a_first_guess_starts_at_the_start(system: str, guess: str) -> None:
     params = DirectParams(system=system, guess=guess)
@@ -56,7 +62,7 @@ def test_a_first_guess_starts_at_the_start(system: str, guess: str) -> None:
     np.testing.assert_array_equal(X[0], params.task.x0)
     if guess == "line":
         tip = params.task.mechanism.tip(X[-1, : nx // 2])
-        np.testing.assert_allclose(tip, params.goal_place, atol=1e-3)
+        np.testing.assert_allclose(tip, params.goal_position, atol=1e-3)
 
 
 SHOULDER, LINKS, WRIST, TOOL, ASIDE = 0.089159, 0.425 + 0.39225, 0.09465, 0.0823, 0.10915
@@ -81,7 +87,7 @@ def distance_of_what_it_reaches(target: np.ndarray) -> float:
 def test_a_place_out_of_reach_is_come_as_near_to_as_the_arm_can(
     target: tuple[float, float, float],
 ) -> None:
-    place, at = np.array(target), system("ur5").mechanism
+    place, at = np.array(target), rest_to_rest_task("ur5").mechanism
     q = reaching_posture("ur5", place)
     least = distance_of_what_it_reaches(place)
     assert least > 0.05
@@ -91,14 +97,14 @@ def test_a_place_out_of_reach_is_come_as_near_to_as_the_arm_can(
 
 def test_so_is_the_axis_of_the_base() -> None:
     """No nearer than the tool can lead back across the distance by which the arm lies aside."""
-    place, at = np.array([0.0, 0.0, 0.3]), system("ur5").mechanism
+    place, at = np.array([0.0, 0.0, 0.3]), rest_to_rest_task("ur5").mechanism
     tip = at.tip(reaching_posture("ur5", place))
     assert np.linalg.norm(tip - place) == pytest.approx(ASIDE - TOOL, abs=1e-4)
 
 
 def test_of_places_within_reach_none_is_missed() -> None:
     """All around the base, behind it too, and each joint within half a turn of home."""
-    at, rng = system("ur5").mechanism, np.random.default_rng(0)
+    at, rng = rest_to_rest_task("ur5").mechanism, np.random.default_rng(0)
     for _ in range(200):
         q = at.arm.home + rng.uniform(-3.0, 3.0, 6)
         place = at.tip(q)
@@ -110,7 +116,7 @@ def test_of_places_within_reach_none_is_missed() -> None:
 def test_a_path_is_parted_where_it_has_gaps() -> None:
     arcs = np.zeros((4, 2, 3))
     arcs[:, :, 0] = [[0.0, 1.0], [1.0, 2.0], [2.5, 3.0], [3.0, 4.0]]
-    first, second = joined(arcs)
+    first, second = join_pieces(arcs)
     assert first[-1, 0] == 2.0
     assert second[0, 0] == 2.5
 
@@ -125,15 +131,15 @@ def solved(params: DirectParams, N: int = 40) -> DirectState:
         motions.append(_motion(program, at))
         history = history.append(params, at, motions[-1])
     assert at.converged, at.stopped
-    plan = playable(params, motions[-1])
+    plan = nominal_trajectory(params, motions[-1])
     state = DirectState(
         motion=motions[0],
         plan=plan,
         history=history,
         playback=start_playback(plan),
-        missed=np.zeros(0),
+        goal_errors=np.zeros(0),
     )
-    return replayed(state, motions[-1], plan, history, failed=False)
+    return play_motion(state, motions[-1], plan, history, failed=False)
 
 
 def _motion(program: Collocation, at: sqp.SqpIterate) -> PiecewiseTrajectory:
@@ -149,23 +155,23 @@ def test_a_plan_is_played_and_the_regulator_holds_it() -> None:
     assert history.gaps.shape == (history.iterations + 1, 40)
     assert history.gaps[0].max() > 0.05
     assert history.gaps[-1].max() < 1e-8
-    assert history.tips.shape == (KEPT, 40, ARC_POINTS, 3)
+    assert history.tips.shape == (KEPT_PATHS, 40, ARC_POINTS, 3)
     while not state.playback.finished(state.plan):
-        state = advanced(params, state)
-    assert state.missed[FEEDBACK] < 0.1 < state.missed[OPEN_LOOP]
-    assert measured(params, state)["missed"] == state.missed[FEEDBACK]
+        state = advance_player(params, state)
+    assert state.goal_errors[FEEDBACK] < 0.1 < state.goal_errors[OPEN_LOOP]
+    assert measure_player(params, state)["missed"] == state.goal_errors[FEEDBACK]
     scene = NullScene()
     draw_robots(scene, params, state)
     draw_paths(scene, params, state)
     draw_goal(scene, params)
     assert {"robot", "open loop", "of open loop", "piece 1", "now", "goal"} <= set(scene.names)
     plain = DirectParams(system="pendulum")
-    state = replayed(state, state.motion, state.plan, history, failed=False)
+    state = play_motion(state, state.motion, state.plan, history, failed=False)
     while not state.playback.finished(state.plan):
-        state = advanced(plain, state)
-    assert state.missed[FEEDBACK] < 1e-3, "the plant being as the plan has it"
-    assert state.missed[OPEN_LOOP] < 0.2, "the errors of 40 steps, grown near the unstable end"
-    again = resampled(params, state.motion, 20)
+        state = advance_player(plain, state)
+    assert state.goal_errors[FEEDBACK] < 1e-3, "the plant being as the plan has it"
+    assert state.goal_errors[OPEN_LOOP] < 0.2, "the errors of 40 steps, grown near the unstable end"
+    again = resample_motion(params, state.motion, 20)
     np.testing.assert_allclose(again.X, state.motion.X[::2], atol=1e-12)
 
 
@@ -187,7 +193,7 @@ def test_positions_are_limited_beyond_start_and_goal() -> None:
     assert np.isinf(DirectParams().problem.x_lower).all()
 
 
-@pytest.mark.parametrize("system", TITLES)
+@pytest.mark.parametrize("system", TASK_TITLES)
 def test_velocities_that_run_away_are_limited(system: str) -> None:
     params = DirectParams(system=system, objective="fastest-end")
     limited = system in ("double-pendulum", "ur5")
@@ -198,16 +204,16 @@ def test_velocities_that_run_away_are_limited(system: str) -> None:
 
 def test_balls_are_dragged() -> None:
     params = DirectParams(system="ur5", obstacle=True)
-    assert dragged(params, "target", (0.301, 0.0, 2.0)) == {
+    assert edit_balls(params, "target", (0.301, 0.0, 2.0)) == {
         "target_x": 0.3,
         "target_y": 0.0,
         "target_z": 1.0,
     }
-    assert set(dragged(params, "obstacle", (0.1, 0.2, 0.3))) == {
+    assert set(edit_balls(params, "obstacle", (0.1, 0.2, 0.3))) == {
         "obstacle_x",
         "obstacle_y",
         "obstacle_z",
     }
-    assert not dragged(params, "other", (0.0, 0.0, 0.0))
+    assert not edit_balls(params, "other", (0.0, 0.0, 0.0))
     assert params.problem.path is not None
     assert DirectParams(system="ur5", obstacle=True, soft=True).problem.path is None

@@ -7,11 +7,11 @@ import gymnasium
 import numpy as np
 import pytest
 
-from labs.algorithms.policy_evaluation import exact
+from labs.algorithms.policy_evaluation import exact_values
 from labs.algorithms.policy_iteration import optimum
 from labs.errors import LabError
 from labs.problems.finite_mdp import FiniteMDP, random_policy
-from labs.tasks.grid_world.map import FALL, MAPS, GridWorld
+from labs.tasks.grid_world.map import FALL_COST, MAPS, GridWorld
 from labs.tasks.grid_world.params import MAP_LENGTH
 
 UP, RIGHT, DOWN, LEFT = range(4)
@@ -74,8 +74,8 @@ def test_a_fall_costs_and_leads_back() -> None:
     assert len(world.cells) == 38
     successor, cost = world.table
     x = int(world.index[2, 5])
-    assert (successor[x, DOWN], cost[x, DOWN]) == (world.start, FALL)
-    assert (successor[world.start, RIGHT], cost[world.start, RIGHT]) == (world.start, FALL)
+    assert (successor[x, DOWN], cost[x, DOWN]) == (world.start, FALL_COST)
+    assert (successor[world.start, RIGHT], cost[world.start, RIGHT]) == (world.start, FALL_COST)
     assert cost[x, RIGHT] == 1.0
     laid = world.on_map(np.arange(38.0), -1.0)
     assert laid[3, 5] == -1.0
@@ -89,7 +89,7 @@ def test_slip_mixes_the_controls() -> None:
     for cell, wanted in (((1, 2), 0.7), ((0, 1), 0.1), ((2, 1), 0.1), ((1, 0), 0.1)):
         assert row[world.index[cell]] == pytest.approx(wanted)
     cliff = GridWorld.parse(MAPS["cliff"])
-    wanted = 1.0 + 0.4 / 4 * (FALL - 1.0)
+    wanted = 1.0 + 0.4 / 4 * (FALL_COST - 1.0)
     assert cliff.mdp(0.9, 0.4).C[cliff.index[2, 5], RIGHT] == pytest.approx(wanted)
 
 
@@ -198,7 +198,7 @@ def test_a_large_map_is_solved_at_once() -> None:
     ahead = np.einsum("uxk,uxk->xu", mdp.P, V[mdp.outcomes])
     np.testing.assert_allclose((mdp.C + 0.99 * ahead).min(axis=1), V, atol=1e-9)
     dense = FiniteMDP(mdp.C, 0.99, mdp.terminal, P=mdp.probabilities)
-    np.testing.assert_allclose(exact(dense, policy), V, atol=1e-9)
+    np.testing.assert_allclose(exact_values(dense, policy), V, atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from labs.tasks.grid_world.picture import board
 WORLD = GridWorld.parse("S.#\n.CG")
 
 
-class Mapped(Params):
+class MapParams(Params):
     """With a map."""
 
     map: MapText = Group("World").text("SG", "Map")
@@ -26,10 +26,10 @@ def click(row: int, column: int, brush: str, world: GridWorld = WORLD) -> object
 
 def test_a_map_that_is_none_is_refused_in_a_sentence() -> None:
     with pytest.raises(ParameterError, match="the map has no goal G"):
-        Mapped().change({"map": "S.."})
+        MapParams().change({"map": "S.."})
     with pytest.raises(ParameterError, match="row 2 of the map"):
-        Mapped().change({"map": "S..\n.?.\n..G"})
-    assert Mapped().change({"map": "..G"}).map == "..G"
+        MapParams().change({"map": "S..\n.?.\n..G"})
+    assert MapParams().change({"map": "..G"}).map == "..G"
 
 
 def test_a_click_makes_what_the_brush_says() -> None:

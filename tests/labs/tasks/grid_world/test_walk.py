@@ -7,11 +7,11 @@ import pytest
 
 from labs.tasks.grid_world.map import MAPS, GridWorld
 from labs.tasks.grid_world.walk import (
-    PATH,
+    PATH_LENGTH,
     GridWalk,
     advance_walk,
     choose_steps,
-    is_on,
+    is_valid_walk,
     nominal_path,
     start_walk,
 )
@@ -24,7 +24,7 @@ def never() -> float:
     raise AssertionError("nothing is left to chance here")
 
 
-def walked(
+def walk_for(
     world: GridWorld,
     policies: np.ndarray,
     walk: GridWalk,
@@ -49,21 +49,21 @@ def constant(world: GridWorld, *controls: int) -> np.ndarray:
 
 def test_a_step_takes_its_time_and_is_paid_when_it_is_chosen() -> None:
     world = GridWorld.parse("S..G")
-    walk = walked(world, constant(world, RIGHT), start_walk(world, MOVE), MOVE - 1, gamma=0.5)
+    walk = walk_for(world, constant(world, RIGHT), start_walk(world, MOVE), MOVE - 1, gamma=0.5)
     assert (walk.at.tolist(), walk.to.tolist(), walk.clock) == ([[0, 0]], [[0, 1]], MOVE - 1)
     assert (walk.cost.tolist(), walk.steps) == ([1.0], 1)
-    walk = walked(world, constant(world, RIGHT), walk, 1, gamma=0.5)
+    walk = walk_for(world, constant(world, RIGHT), walk, 1, gamma=0.5)
     assert (walk.at.tolist(), walk.to.tolist(), walk.clock) == ([[0, 1]], [[0, 1]], 0)
-    walk = walked(world, constant(world, RIGHT), walk, 2 * MOVE, gamma=0.5)
+    walk = walk_for(world, constant(world, RIGHT), walk, 2 * MOVE, gamma=0.5)
     assert (walk.at.tolist(), walk.cost.tolist(), walk.idle) == ([[0, 3]], [1.75], 0)
     assert walk.path[:, 0].tolist() == [[0, 0], [0, 1], [0, 2], [0, 3]]
-    walk = walked(world, constant(world, RIGHT), walk, 2 * MOVE, gamma=0.5)
+    walk = walk_for(world, constant(world, RIGHT), walk, 2 * MOVE, gamma=0.5)
     assert (walk.at.tolist(), walk.cost.tolist(), walk.idle) == ([[0, 3]], [1.75], 2)
 
 
 def test_walkers_side_by_side_go_their_own_ways_and_wait_for_each_other() -> None:
     world = GridWorld.parse("SG\n..")
-    walk = walked(world, constant(world, RIGHT, DOWN), start_walk(world, MOVE, 2), 3 * MOVE)
+    walk = walk_for(world, constant(world, RIGHT, DOWN), start_walk(world, MOVE, 2), 3 * MOVE)
     assert walk.at.tolist() == [[0, 1], [1, 0]]
     assert (walk.cost.tolist(), walk.steps, walk.idle) == ([1.0, 3.0], 3, 0)
 
@@ -74,28 +74,28 @@ def test_a_slip_follows_the_numbers_drawn() -> None:
     world = GridWorld.parse(".G.\n.S.\n...")
     wanted = constant(world, RIGHT)
     for drawn, cell in ((0.05, [0, 1]), (0.15, [1, 0]), (0.25, [1, 2]), (0.85, [1, 2])):
-        walk = walked(world, wanted, start_walk(world, 1), 1, slip=0.4, random=lambda r=drawn: r)  # type: ignore[misc]
+        walk = walk_for(world, wanted, start_walk(world, 1), 1, slip=0.4, random=lambda r=drawn: r)  # type: ignore[misc]
         assert walk.at.tolist() == [cell], drawn
-    walk = walked(world, wanted, start_walk(world, 1), 1, slip=0.4, random=lambda: 0.95)
+    walk = walk_for(world, wanted, start_walk(world, 1), 1, slip=0.4, random=lambda: 0.95)
     assert walk.at.tolist() == [[2, 1]]
 
 
 def test_who_stands_on_no_cell_is_back_at_the_start() -> None:
     world = GridWorld.parse("S..G")
-    walk = walked(world, constant(world, RIGHT), start_walk(world, MOVE), 2 * MOVE)
-    assert is_on(world, walk)
+    walk = walk_for(world, constant(world, RIGHT), start_walk(world, MOVE), 2 * MOVE)
+    assert is_valid_walk(world, walk)
     for text in ("S.#G", "SG"):
         smaller = GridWorld.parse(text)
-        assert not is_on(smaller, walk)
-        again = walked(smaller, constant(smaller, RIGHT), walk, MOVE)
+        assert not is_valid_walk(smaller, walk)
+        again = walk_for(smaller, constant(smaller, RIGHT), walk, MOVE)
         assert again.at.tolist() == [[0, 1]]
 
 
 def test_a_long_walk_keeps_the_end_of_its_path_and_leaves_the_old_walk_alone() -> None:
     world = GridWorld.parse("S.\n.G")
     first = start_walk(world, 1)
-    walk = walked(world, constant(world, UP), first, PATH + 50)
-    assert walk.path.shape == (PATH, 1, 2)
+    walk = walk_for(world, constant(world, UP), first, PATH_LENGTH + 50)
+    assert walk.path.shape == (PATH_LENGTH, 1, 2)
     assert first.path.shape == (1, 1, 2)
     assert first.cost.tolist() == [0.0]
 

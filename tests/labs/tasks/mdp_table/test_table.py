@@ -29,7 +29,7 @@ ROWS = [
 ]
 
 
-def same(a: MdpTable, b: MdpTable) -> bool:
+def same_table(a: MdpTable, b: MdpTable) -> bool:
     return (
         (a.states, a.controls) == (b.states, b.controls)
         and np.array_equal(a.P, b.P)
@@ -70,7 +70,7 @@ def test_a_decision_process_is_one_for_the_algorithms() -> None:
     ids=["tabs", "semicolons", "quoted", "blank lines", "capitals", "json", "json in lines"],
 )
 def test_other_ways_to_write_it(text: str) -> None:
-    assert same(parse_table(text), parse_table(DECISION))
+    assert same_table(parse_table(text), parse_table(DECISION))
 
 
 def test_columns_may_have_any_order_and_costs_may_be_missing() -> None:
@@ -200,7 +200,7 @@ def test_json_has_the_names_that_csv_has() -> None:
             ("s", "a", "s'", "Chance", "l")]  # fmt: skip
     rows = [["A", "stay", "A", 1, 1], ["A", "go", "A", "20 %", 3], ["A", "go", "B", 0.8, 3]]
     for names in keys:
-        assert same(
+        assert same_table(
             parse_table(json.dumps([dict(zip(names, row, strict=True)) for row in rows])),
             parse_table(LONG),
         )

@@ -12,7 +12,7 @@ from labs.tasks.motion.continuous import (
     continuous_motion,
 )
 from labs.tasks.motion.motions import MotionWeights
-from labs.tasks.motion.tip_constraints import AtTarget, Ball, OutsideBalls
+from labs.tasks.motion.tip_constraints import Ball, ObstacleConstraint, TipTargetConstraint
 
 TARGET = np.array([0.4, -0.35, 0.25])
 BALLS = (Ball(np.array([0.3, -0.2, 0.4]), 0.1), Ball(np.array([0.1, 0.5, 0.3]), 0.2))
@@ -25,7 +25,7 @@ def test_every_motion_has_every_objective(name: str, objective: str) -> None:
     m, goal = mechanism(name), CONTINUOUS_MOTIONS[name].goal
     rng = np.random.default_rng(0)
     X, U = rng.normal(size=(3, m.nx)), rng.normal(size=(3, m.nu))
-    scaled = (U - m.holding(m.arm.home)) / CONTINUOUS_MOTIONS[name].control_scale
+    scaled = (U - m.equilibrium_control(m.arm.home)) / CONTINUOUS_MOTIONS[name].control_scale
     running = {
         "least-time": np.ones(3),
         "least-energy": (scaled**2).sum(axis=1),
@@ -69,13 +69,13 @@ def test_the_derivatives_of_the_cost_are_those_of_finite_differences(exact: bool
 def test_constraints_of_the_tip_and_their_jacobians() -> None:
     m = mechanism("ur5")
     x = np.concatenate([m.arm.home, np.zeros(6)])
-    outside, at = OutsideBalls(m, BALLS), AtTarget(m, TARGET)
+    outside, at = ObstacleConstraint(m, BALLS), TipTargetConstraint(m, TARGET)
     p = m.tip(m.arm.home)
     np.testing.assert_allclose(at.values(x[None])[0], p - TARGET)
     center, r = BALLS[0]
     expected = (r**2 - ((p - center) ** 2).sum()) / (2 * r)
     assert outside.values(x[None])[0, 0] == pytest.approx(expected)
-    surface = OutsideBalls(m, (Ball(p + np.array([0.0, 0.0, 0.11]), 0.1),))
+    surface = ObstacleConstraint(m, (Ball(p + np.array([0.0, 0.0, 0.11]), 0.1),))
     assert surface.values(x[None])[0, 0] == pytest.approx(-0.01, rel=0.1), "nearly the depth"
     for constraint in (outside, at):
         J = constraint.jacobians(x[None])[0]

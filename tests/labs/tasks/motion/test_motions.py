@@ -9,9 +9,9 @@ from labs.models.mechanisms import mechanism
 from labs.tasks.motion.motions import (
     MOTIONS,
     MotionWeights,
-    first_guess,
+    initial_controls,
     motion_problem,
-    resample,
+    resample_controls,
     tip_path,
 )
 
@@ -26,7 +26,7 @@ def test_the_cost_is_that_of_the_docstring(name: str) -> None:
     problem = motion_problem(name, WEIGHTS, N, h, target=TARGET)
     X, U = rng.normal(size=(N + 1, 2 * n)), rng.normal(size=(N, moved.nu))
     held = pin.computeGeneralizedGravity(moved.model, moved.data, moved.arm.home)[
-        list(moved.driven)
+        list(moved.actuated_joints)
     ]
     before = np.array(motion.goal) if motion.goal else moved.arm.home
     J = 0.0
@@ -51,29 +51,31 @@ def test_the_size_of_a_pendulums_control_holds_it_level() -> None:
     level = {"pendulum": [np.pi / 2], "double-pendulum": [np.pi / 2, 0.0]}
     for name, q in level.items():
         np.testing.assert_allclose(
-            mechanism(name).holding(np.array(q)), MOTIONS[name].control_scale
+            mechanism(name).equilibrium_control(np.array(q)), MOTIONS[name].control_scale
         )
 
 
 def test_the_first_guess_is_a_push_or_a_swing_within_the_bound() -> None:
     problem = motion_problem("pendulum", WEIGHTS, 100, 0.01, limit=0.3)
     size = np.array([2.0])
-    np.testing.assert_array_equal(first_guess(problem, size, 0.1, 0.0), np.full((100, 1), 0.2))
-    swing = first_guess(problem, size, 0.1, 1.0)[:, 0]
+    np.testing.assert_array_equal(initial_controls(problem, size, 0.1, 0.0), np.full((100, 1), 0.2))
+    swing = initial_controls(problem, size, 0.1, 1.0)[:, 0]
     np.testing.assert_allclose(swing, 0.2 * np.cos(0.02 * np.pi * np.arange(100)), atol=1e-15)
-    assert first_guess(problem, size, 9.0, 0.0).max() == pytest.approx(0.3 * 4.905)
+    assert initial_controls(problem, size, 9.0, 0.0).max() == pytest.approx(0.3 * 4.905)
     reach = motion_problem("ur5", WEIGHTS, 3, 0.01, target=TARGET)
-    still = first_guess(reach, np.ones(6), 0.0, 0.0)
+    still = initial_controls(reach, np.ones(6), 0.0, 0.0)
     arm = mechanism("ur5")
     np.testing.assert_allclose(arm.f(np.r_[arm.arm.home, np.zeros(6)], still[2]), 0.0, atol=1e-9)
 
 
 def test_controls_fit_another_step_and_horizon() -> None:
     U = np.arange(4.0)[:, None]
-    np.testing.assert_array_equal(resample(U, 0.02, 0.02, 4), U)
-    np.testing.assert_array_equal(resample(U, 0.02, 0.02, 2), U[:2])
-    np.testing.assert_array_equal(resample(U, 0.02, 0.01, 10)[:, 0], [0, 0, 1, 1, 2, 2, 3, 3, 3, 3])
-    np.testing.assert_array_equal(resample(U, 0.01, 0.02, 3)[:, 0], [1, 3, 3])
+    np.testing.assert_array_equal(resample_controls(U, 0.02, 0.02, 4), U)
+    np.testing.assert_array_equal(resample_controls(U, 0.02, 0.02, 2), U[:2])
+    np.testing.assert_array_equal(
+        resample_controls(U, 0.02, 0.01, 10)[:, 0], [0, 0, 1, 1, 2, 2, 3, 3, 3, 3]
+    )
+    np.testing.assert_array_equal(resample_controls(U, 0.01, 0.02, 3)[:, 0], [1, 3, 3])
 
 
 def test_tips_follow_a_trajectory() -> None:

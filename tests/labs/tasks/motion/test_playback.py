@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from labs.algorithms.integrators import rk4
-from labs.models.discrete import Discrete
+from labs.models.discrete import DiscreteMechanism
 from labs.models.mechanisms import Mechanism, mechanism
 from labs.tasks.motion.playback import (
     FEEDBACK,
@@ -14,7 +14,7 @@ from labs.tasks.motion.playback import (
     NominalTrajectory,
     Playback,
     advance_playback,
-    jump_states,
+    apply_state_jump,
     start_playback,
 )
 
@@ -22,7 +22,7 @@ from labs.tasks.motion.playback import (
 def random_plan(name: str, h: float, N: int = 12) -> NominalTrajectory:
     moved, rng = mechanism(name), np.random.default_rng(2)
     U = rng.normal(size=(N, moved.nu))
-    X = Discrete(moved, h, "rk4").rollout(np.zeros(moved.nx), U)
+    X = DiscreteMechanism(moved, h, "rk4").rollout(np.zeros(moved.nx), U)
     return NominalTrajectory(X, U, rng.normal(size=(N, moved.nu, moved.nx)), h)
 
 
@@ -74,7 +74,7 @@ def test_noise_enters_through_the_feedback_alone() -> None:
 
 def test_a_blow_changes_both() -> None:
     plan = random_plan("pendulum", 0.01)
-    runs = jump_states(start_playback(plan), np.array([[0.0, 1.0], [0.0, 2.0]]))
+    runs = apply_state_jump(start_playback(plan), np.array([[0.0, 1.0], [0.0, 2.0]]))
     np.testing.assert_array_equal(runs.x, plan.X[0] + [[0.0, 1.0], [0.0, 2.0]])
 
 

@@ -70,7 +70,7 @@ def test_the_table_leads_where_the_motion_leads() -> None:
             q, v = np.split(grid.nodes[x], 2)
             q, v = integrate_pendulum(q, v, grid.torques[u], grid.friction, grid.dt)
             assert grid.successor[x, u] == grid.state(q, v)
-    pieces = np.concatenate([rows for _, rows in grid.rows(chunk=100)])
+    pieces = np.concatenate([rows for _, rows in grid.successor_rows(chunk=100)])
     np.testing.assert_array_equal(pieces, grid.successor)
 
 

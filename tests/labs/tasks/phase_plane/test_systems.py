@@ -7,7 +7,7 @@ from scipy.linalg import expm
 from labs.algorithms.integrators import rk4
 from labs.errors import LabError
 from labs.models.mechanisms import mechanism
-from labs.tasks.phase_plane.systems import PLANE_SYSTEMS, STEP, plane_system
+from labs.tasks.phase_plane.systems import PLANE_SYSTEMS, SIMULATION_STEP, plane_system
 
 RNG = np.random.default_rng(12)
 
@@ -20,11 +20,13 @@ def test_the_formula_moves_as_the_body_does(name: str) -> None:
         x, u = RNG.normal(size=2), RNG.normal(size=1)
         q, v = system.pose(x), x[1:]
         for _ in range(3):
-            q, v = rk4(body.acceleration(u), q, v, STEP)
-        after = system.step(x, u, 3 * STEP)
+            q, v = rk4(body.acceleration(u), q, v, SIMULATION_STEP)
+        after = system.step(x, u, 3 * SIMULATION_STEP)
         np.testing.assert_allclose(system.pose(after), q, atol=1e-12)
         np.testing.assert_allclose(after[1:], v, atol=1e-11)
-        np.testing.assert_allclose(system.holding(x[0]), body.holding(system.pose(x)), atol=1e-12)
+        np.testing.assert_allclose(
+            system.holding(x[0]), body.equilibrium_control(system.pose(x)), atol=1e-12
+        )
 
 
 @pytest.mark.parametrize("name", PLANE_SYSTEMS)
@@ -52,8 +54,8 @@ def test_it_rests_and_is_linear_nearby(name: str) -> None:
     by_u = (system.step(x, u + d, 0.1) - system.step(x, u - d, 0.1)) / (2 * d)
     np.testing.assert_allclose(A, np.transpose(by_x), atol=1e-8)
     np.testing.assert_allclose(B[:, 0], by_u, atol=1e-8)
-    by_q, by_v = system.slopes(x[0])
-    exact = expm(0.1 * np.array([[0, 1, 0], [by_q, by_v, system.strength], [0, 0, 0]]))
+    by_q, by_v = system.acceleration_gradients(x[0])
+    exact = expm(0.1 * np.array([[0, 1, 0], [by_q, by_v, system.input_gain], [0, 0, 0]]))
     np.testing.assert_allclose(np.hstack([A, B]), exact[:2], atol=1e-7)
 
 

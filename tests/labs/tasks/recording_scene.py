@@ -7,7 +7,7 @@ from labs.scene import Color, NullScene
 from labs.shapes import Vector3
 
 
-class Drawn(NullScene):
+class RecordingScene(NullScene):
     """Keeps what is drawn, by name."""
 
     def __init__(self) -> None:
@@ -64,7 +64,7 @@ class Drawn(NullScene):
         self.labels[name] = text
 
 
-def finite(scene: Drawn) -> bool:
+def all_finite(scene: RecordingScene) -> bool:
     return all(
         np.isfinite(part).all() for parts in (scene.points, scene.colors) for part in parts.values()
     )

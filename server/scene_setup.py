@@ -6,7 +6,7 @@ from server.messages import View
 from server.nodes import COLORS
 
 
-def show_surroundings(server: viser.ViserServer, view: View) -> None:
+def configure_scene(server: viser.ViserServer, view: View) -> None:
     """Light or dark; low graphics means no environment light and no shadows."""
     server.gui.configure_theme(
         dark_mode=view.dark,

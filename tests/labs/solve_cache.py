@@ -14,17 +14,17 @@ from typing import Any
 
 from labs.lab import Lab, Snapshot, State
 from labs.params import Params
-from tests.labs.contract import plain
+from tests.labs.contract import comparable
 
 Solve = Callable[[Any, Any], Iterator[Snapshot | None]]
-MOST = 300
+MAX_CACHED = 300
 """Runs that are kept, of one lab; those asked for least recently are forgotten."""
 
 _runs: OrderedDict[Any, Iterator[Snapshot | None]] = OrderedDict()
 _sharing = ContextVar("sharing", default=True)
 
 
-def share(kind: type[Lab[Any, Any]]) -> None:
+def share_solves(kind: type[Lab[Any, Any]]) -> None:
     """From now on, labs of this kind solve nothing twice that is still kept."""
     solve = kind.solve
 
@@ -36,7 +36,7 @@ def share(kind: type[Lab[Any, Any]]) -> None:
 
 
 @contextmanager
-def anew() -> Iterator[None]:
+def sharing_disabled() -> Iterator[None]:
     """Within, whatever begins to be solved is solved indeed."""
     token = _sharing.set(False)
     try:
@@ -52,10 +52,10 @@ def _solve(
         return solve(params, state)
     if any(other is not kind for other, *_ in _runs):
         _runs.clear()
-    key = (kind, params, plain(state))
+    key = (kind, params, comparable(state))
     if key not in _runs:
         (_runs[key],) = itertools.tee(solve(params, state), 1)
     _runs.move_to_end(key)
-    if len(_runs) > MOST:
+    if len(_runs) > MAX_CACHED:
         _runs.popitem(last=False)
     return copy.copy(_runs[key])  # from its beginning, solved as far as anybody ever asked

@@ -18,7 +18,7 @@ REST = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Live:
+class LiveLearner:
     """Where the walker is, and what it has come to. Its arrays are never written into."""
 
     states: np.ndarray
@@ -42,19 +42,19 @@ class Live:
         return self.phase >= 1.0
 
 
-def begin(world: PredictionWorld, random: np.ndarray, v0: float) -> Live:
+def start_live_learner(world: PredictionWorld, random: np.ndarray, v0: float) -> LiveLearner:
     """At the start of the first episode. `random` (4,) stays as it is."""
     V = np.tile(np.where(world.mdp.terminal, 0.0, v0), (2, 1))
     return _new_episode(world, V, np.zeros(V.shape, np.int32), random.copy(), 0)
 
 
-def advance(
+def advance_live_learner(
     world: PredictionWorld,
     rules: tuple[UpdateRule, UpdateRule],
     first: bool,
-    live: Live,
+    live: LiveLearner,
     part: float,
-) -> Live:
+) -> LiveLearner:
     """The learner when another `part` in [0, 1] of a step is done."""
     phase = live.phase + part
     if live.over:
@@ -63,7 +63,7 @@ def advance(
         return _new_episode(world, live.V, live.visits, live.random.copy(), live.episodes)
     if phase < 1.0:
         return replace(live, phase=phase)
-    live = _learned(world, rules, first, live)
+    live = _learn_step(world, rules, first, live)
     y = int(live.states[-1])
     if world.mdp.terminal[y] or len(live.controls) >= world.task.task.horizon:
         return replace(live, phase=1.0, episodes=live.episodes + 1)
@@ -80,16 +80,16 @@ def advance(
 
 def _new_episode(
     world: PredictionWorld, V: np.ndarray, visits: np.ndarray, random: np.ndarray, episodes: int
-) -> Live:
+) -> LiveLearner:
     """`random` changes in place."""
     x = initial_state(world.task.task, random)
     u, y = sample_step(world.task, x, random)
-    return Live(np.array([x, y]), np.array([u]), V, visits, random, 0.0, episodes)
+    return LiveLearner(np.array([x, y]), np.array([u]), V, visits, random, 0.0, episodes)
 
 
-def _learned(
-    world: PredictionWorld, rules: tuple[UpdateRule, UpdateRule], first: bool, live: Live
-) -> Live:
+def _learn_step(
+    world: PredictionWorld, rules: tuple[UpdateRule, UpdateRule], first: bool, live: LiveLearner
+) -> LiveLearner:
     """What the step that was just done teaches."""
     V, visits, gamma, T = live.V.copy(), live.visits.copy(), world.mdp.gamma, len(live.controls)
     td0(gamma, _last_steps(world, live, 1), 1, rules[1], V[1], visits[1])
@@ -99,7 +99,7 @@ def _learned(
     return replace(live, V=V, visits=visits)
 
 
-def _last_steps(world: PredictionWorld, live: Live, many: int) -> Episode:
+def _last_steps(world: PredictionWorld, live: LiveLearner, many: int) -> Episode:
     """As an episode."""
     states, controls = live.states[-many - 1 :], live.controls[-many:]
     costs = np.ascontiguousarray(world.mdp.C[states[:-1], controls])

@@ -18,11 +18,11 @@ from labs.resumable import Resumable
 
 NODES = 81
 """Along either axis, of what is kept."""
-FINER = 2
+GRID_REFINEMENT = 2
 """The grid has so many times as many intervals, but for MPC, whose law takes longer."""
-STARTS = 60
+ENSEMBLE_SIZE = 60
 """States let loose at once."""
-ROUNDED = 1e-12
+DECREASE_TOLERANCE = 1e-12
 """What V may fail to decrease by, in parts of itself, by rounding alone."""
 
 
@@ -40,7 +40,7 @@ class LyapunovAnalysis:
     """Of the set, if it is a level set; of a box, the level of the largest set of a quadratic V in
     it in which V decreases."""
     starts: np.ndarray
-    """(STARTS, 2) on the edge of the set."""
+    """(ENSEMBLE_SIZE, 2) on the edge of the set."""
     alphas: np.ndarray
     """(3,) alpha_1, alpha_2, alpha_3 on the set, or in the window if the set is empty."""
     decreasing: float
@@ -53,20 +53,20 @@ class LyapunovAnalysis:
         return LyapunovConstants(*map(float, self.alphas))
 
 
-def study(params: LyapunovParams) -> Resumable[LyapunovAnalysis | str]:
+def analyse(params: LyapunovParams) -> Resumable[LyapunovAnalysis | str]:
     """Looks at the grid; why there is no V, where there is none."""
     try:
         candidate = params.V
     except LabError as error:
         return str(error)
     loop = params.loop
-    skip = 1 if params.system == "mpc" else FINER
+    skip = 1 if params.system == "mpc" else GRID_REFINEMENT
     fine = params.plane.grid(skip * (NODES - 1) + 1, skip * (NODES - 1) + 1)
     X = fine.reshape(-1, 2)
-    F = yield from loop.grid_ahead(X)
+    F = yield from loop.next_grid_states(X)
     V = yield from candidate.values(X)
     V_next = yield from candidate.values(F)
-    falls = V_next < V - ROUNDED * np.abs(V)
+    falls = V_next < V - DECREASE_TOLERANCE * np.abs(V)
     shape, kept = fine.shape[:2], (slice(None, None, skip), slice(None, None, skip))
     after = np.where(falls, V_next, V).reshape(shape)
     near = linear_constants(loop.A, candidate.P)
@@ -94,17 +94,19 @@ def study(params: LyapunovParams) -> Resumable[LyapunovAnalysis | str]:
         (V_next - V).reshape(shape)[kept],
         level_max,
         level,
-        _edge(params, fine[kept], values, level),
+        _boundary_states(params, fine[kept], values, level),
         np.array(alphas),
         float(falls[apart].mean()),
         float((level_max > V).mean()) if level_max > 0.0 else 0.0,
     )
 
 
-def _edge(params: LyapunovParams, grid: np.ndarray, V: np.ndarray, level: float) -> np.ndarray:
-    """(STARTS, 2) states on the edge of the set, seen from the origin at even angles; of a set
-    that is empty, on an ellipse half as large as the window."""
-    angles = 2.0 * np.pi * (np.arange(STARTS) + 0.5) / STARTS
+def _boundary_states(
+    params: LyapunovParams, grid: np.ndarray, V: np.ndarray, level: float
+) -> np.ndarray:
+    """(ENSEMBLE_SIZE, 2) states on the edge of the set, seen from the origin at even angles; of a
+    set that is empty, on an ellipse half as large as the window."""
+    angles = 2.0 * np.pi * (np.arange(ENSEMBLE_SIZE) + 0.5) / ENSEMBLE_SIZE
     ways = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     window = np.array(params.loop.window)
     if params.set == "box":
@@ -115,10 +117,10 @@ def _edge(params: LyapunovParams, grid: np.ndarray, V: np.ndarray, level: float)
     # Outward along each ray until V is no longer below: first on the grid's scale, then between.
     reach = np.linspace(0.0, 1.0, 2 * NODES)[1:] / np.abs(ways).max(axis=1, keepdims=True)
     along = reach[..., None] * ways[:, None] * window
-    found = interpolated(grid, V, along.reshape(-1, 2)).reshape(reach.shape)
+    found = interpolate_value(grid, V, along.reshape(-1, 2)).reshape(reach.shape)
     beyond = found > level
     first = np.where(beyond.any(axis=1), beyond.argmax(axis=1), reach.shape[1] - 1)
-    rows = np.arange(STARTS)
+    rows = np.arange(ENSEMBLE_SIZE)
     before = np.maximum(first - 1, 0)
     low = np.where(first > 0, found[rows, before], 0.0)
     high = found[rows, first]
@@ -128,7 +130,7 @@ def _edge(params: LyapunovParams, grid: np.ndarray, V: np.ndarray, level: float)
     return np.asarray(size[:, None] * ways * window)
 
 
-def interpolated(grid: np.ndarray, V: np.ndarray, X: np.ndarray) -> np.ndarray:
+def interpolate_value(grid: np.ndarray, V: np.ndarray, X: np.ndarray) -> np.ndarray:
     """V (k,) at states X (k, 2) of the window, by the grid's four nodes about each."""
     lower, upper = grid[0, 0], grid[-1, -1]
     place = np.clip((X - lower) / (upper - lower), 0.0, 1.0) * (NODES - 1)

@@ -19,10 +19,10 @@ from labs.scene import Scene
 Fields = dict[str, np.ndarray]
 
 
-class Subject(Protocol):
+class LearningWorld(Protocol):
     """One world."""
 
-    def begin(self, params: ApproximationParams, rng: np.random.Generator) -> Training:
+    def initial_training(self, params: ApproximationParams, rng: np.random.Generator) -> Training:
         """Nothing learned yet."""
         ...
 

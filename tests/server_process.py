@@ -18,11 +18,11 @@ from websockets.sync.client import connect
 from websockets.sync.connection import Connection
 
 T = TypeVar("T")
-PATIENCE = 90.0
+TIMEOUT = 90.0
 """[s] What takes longer does not come any more, however busy the machine is."""
 
 
-class Served:
+class ServerProcess:
     """`with Served(ORCLAB_SPARES="0") as server: server.http.get("/")`."""
 
     def __init__(
@@ -51,7 +51,7 @@ class Served:
         self.http = httpx.Client(base_url=self.address, timeout=60)
         spares = int(self._environment.get("ORCLAB_SPARES", "1"))
         # A fresh checkout compiles the solvers first.
-        until(lambda: not wait or self.health()["spares"] >= spares, seconds=240)
+        wait_until(lambda: not wait or self.health()["spares"] >= spares, seconds=240)
 
     def __enter__(self) -> Self:
         return self
@@ -91,25 +91,25 @@ class Served:
         return found
 
     @contextlib.contextmanager
-    def session(self, lab: str, **more: Any) -> Iterator["Opened"]:
+    def session(self, lab: str, **more: Any) -> Iterator["SessionClient"]:
         """A session that is closed at the end."""
-        opened = Opened.new(self, lab, more)
+        opened = SessionClient.new(self, lab, more)
         try:
             yield opened
         finally:
             self.http.delete(opened.path)
 
 
-class Opened:
+class SessionClient:
     """A session seen through the API and its stream."""
 
-    def __init__(self, server: Served, info: dict[str, Any]) -> None:
+    def __init__(self, server: ServerProcess, info: dict[str, Any]) -> None:
         """`info`: of a session that was opened elsewhere, by a page."""
         self.server, self.info = server, info
         self.path = f"/api/sessions/{info['id']}"
 
     @classmethod
-    def new(cls, server: Served, lab: str, more: dict[str, Any]) -> Self:
+    def new(cls, server: ServerProcess, lab: str, more: dict[str, Any]) -> Self:
         answer = server.http.post("/api/sessions", json={"lab": lab, **more})
         assert answer.status_code == 201, answer.text
         return cls(server, answer.json())
@@ -126,21 +126,21 @@ class Opened:
         return answer
 
     @contextlib.contextmanager
-    def stream(self, **options: Any) -> Iterator["Stream"]:
+    def stream(self, **options: Any) -> Iterator["StreamClient"]:
         address = self.server.address.replace("http", "ws") + self.info["stream"]
         with connect(address, **options) as socket:
-            yield Stream(socket)
+            yield StreamClient(socket)
 
 
-class Stream:
+class StreamClient:
     """A session's stream, read message by message."""
 
     def __init__(self, socket: Connection) -> None:
         self.socket = socket
 
     def next(self, type: str, when: Callable[[dict[str, Any]], bool] = lambda m: True) -> Any:
-        """The next message of a type that fulfils a condition. Fails after `PATIENCE`."""
-        end = time.monotonic() + PATIENCE
+        """The next message of a type that fulfils a condition. Fails after `TIMEOUT`."""
+        end = time.monotonic() + TIMEOUT
         while time.monotonic() < end:
             message = json.loads(self.socket.recv(timeout=end - time.monotonic()))
             if message["type"] == type and when(message):
@@ -148,7 +148,7 @@ class Stream:
         raise AssertionError(f"no such {type} came")
 
 
-def until(true: Callable[[], bool], seconds: float = PATIENCE) -> None:
+def wait_until(true: Callable[[], bool], seconds: float = TIMEOUT) -> None:
     """Waits until something is true. Fails after `seconds`."""
     end = time.monotonic() + seconds
     while not true():
@@ -156,7 +156,7 @@ def until(true: Callable[[], bool], seconds: float = PATIENCE) -> None:
         time.sleep(0.02)
 
 
-def run_apart(work: Coroutine[Any, Any, T]) -> T:
+def run_in_thread(work: Coroutine[Any, Any, T]) -> T:
     """As `asyncio.run`, on a thread of its own: Playwright has a loop on this one."""
     with ThreadPoolExecutor(1) as pool:
         return pool.submit(asyncio.run, work).result()

@@ -9,17 +9,17 @@ from scipy.sparse import block_array, csc_array
 from labs.algorithms.multiple_shooting import MultipleShooting
 from labs.resumable import Resumable
 
-LARGEST = 250
+MAX_ROWS = 250
 """Rows of the equations whose condition number is computed, at most."""
 LARGEST_CONDITION = 1e15
 """Beyond it a condition number is rounding alone."""
-CELLS = 120
+MAX_CELLS = 120
 """Rows and columns of the map of nonzeros, at most."""
 EMPTY, HESSIAN, JACOBIAN = 0.0, 1.0, 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class Anatomy:
+class ShootingStructure:
     """Of one iterate. Plain data; arrays are never written into again."""
 
     cuts: np.ndarray
@@ -44,7 +44,9 @@ class Anatomy:
         return self.nonzeros / (self.variables * (self.variables + self.equalities))
 
 
-def anatomy(shooting: MultipleShooting, z: np.ndarray, u_0: np.ndarray) -> Resumable[Anatomy]:
+def shooting_structure(
+    shooting: MultipleShooting, z: np.ndarray, u_0: np.ndarray
+) -> Resumable[ShootingStructure]:
     """Of the variables z (n,), whose arcs do not diverge."""
     cut, nx = shooting.segments, shooting.nx
     sensitivities = shooting.sensitivities(z)
@@ -61,7 +63,7 @@ def anatomy(shooting: MultipleShooting, z: np.ndarray, u_0: np.ndarray) -> Resum
     yield
     scale = np.ones(shooting.n)
     scale[cut.controls] = u_0
-    return Anatomy(
+    return ShootingStructure(
         np.append(cut.first_steps, shooting.steps.K),
         growth,
         whole,
@@ -69,14 +71,14 @@ def anatomy(shooting: MultipleShooting, z: np.ndarray, u_0: np.ndarray) -> Resum
         shooting.n,
         len(values.c),
         L_zz.nnz + c_z.nnz,
-        _condition(L_zz, c_z, scale),
+        _condition_number(L_zz, c_z, scale),
     )
 
 
 def _pattern(L_zz: csc_array, c_z: csc_array) -> np.ndarray:
     """A cell shows what is in any of its rows and columns."""
     n, k = L_zz.shape[0], c_z.shape[0]
-    size = -(-(n + k) // CELLS)
+    size = -(-(n + k) // MAX_CELLS)
     cells = -(-(n + k) // size)
     shown = np.full((cells, cells), EMPTY)
     inner, outer = L_zz.tocoo(), c_z.tocoo()
@@ -86,9 +88,9 @@ def _pattern(L_zz: csc_array, c_z: csc_array) -> np.ndarray:
     return shown
 
 
-def _condition(L_zz: csc_array, c_z: csc_array, scale: np.ndarray) -> float:
+def _condition_number(L_zz: csc_array, c_z: csc_array, scale: np.ndarray) -> float:
     """The ratio of the largest and the least singular value."""
-    if sum(c_z.shape) > LARGEST:
+    if sum(c_z.shape) > MAX_ROWS:
         return 0.0
     H = scale[:, None] * L_zz.toarray() * scale
     J = csc_array(c_z * scale)

@@ -11,12 +11,12 @@ import numpy as np
 
 from labs.algorithms.monte_carlo import every_visit
 from labs.algorithms.td_lambda import eligibility_traces, lambda_return, true_online
-from labs.algorithms.temporal_difference import n_step, n_step_so_far, td0
+from labs.algorithms.temporal_difference import n_step, n_step_ongoing, td0
 from labs.problems.episodes import UpdateRule
 from labs.problems.prediction import Episode, empty_episode, sample_episode
-from labs.reinforcement_learning.td_lambda.tasks import Place
+from labs.reinforcement_learning.td_lambda.tasks import PredictionPlace
 
-WAIT_FOR_THE_END = ("forward", "monte-carlo")
+END_OF_EPISODE_METHODS = ("forward", "monte-carlo")
 """Methods that learn nothing before an episode is over."""
 
 
@@ -34,20 +34,20 @@ class PartialEpisode(NamedTuple):
         return self.done == len(self.costs)
 
 
-def draw_episode(place: Place, random: np.ndarray) -> PartialEpisode:
+def draw_episode(place: PredictionPlace, random: np.ndarray) -> PartialEpisode:
     """An episode before its first step. `random` (4,) changes in place."""
     room = empty_episode(place.task.task.horizon)
     T = int(sample_episode(place.task, random, room))
     return PartialEpisode(room.states[: T + 1].copy(), room.costs[:T].copy())
 
 
-def learned(
-    place: Place, method: str, rule: UpdateRule, V: np.ndarray, steps: PartialEpisode
+def updated_values(
+    place: PredictionPlace, method: str, rule: UpdateRule, V: np.ndarray, steps: PartialEpisode
 ) -> np.ndarray:
     """(X,) the values after the steps done, from V (X,), those before the episode."""
     V, N, t = V.copy(), np.zeros(len(V), np.int32), steps.done
     gamma, over = place.task.task.gamma, steps.over
-    if not over and (rule.offline or method in WAIT_FOR_THE_END):
+    if not over and (rule.offline or method in END_OF_EPISODE_METHODS):
         return V
     episode = Episode(steps.states, np.zeros(0, np.int64), steps.costs, np.zeros(len(steps.costs)))
     ended = bool(place.task.task.terminal[steps.states[-1]])
@@ -57,7 +57,7 @@ def learned(
         case "n-step" if over:
             n_step(gamma, episode, t, rule, V, N)
         case "n-step":
-            n_step_so_far(gamma, episode, t, rule, V, N)
+            n_step_ongoing(gamma, episode, t, rule, V, N)
         case "forward":
             lambda_return(gamma, episode, t, rule, V, N)
         case "backward":
@@ -69,7 +69,7 @@ def learned(
     return V
 
 
-def credit(
+def eligibility(
     gamma: float, method: str, rule: UpdateRule, steps: PartialEpisode, states: int
 ) -> np.ndarray:
     """(X,) e: how much the surprise of the last step done counts in the update of each of so many

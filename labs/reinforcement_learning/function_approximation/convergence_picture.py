@@ -12,7 +12,7 @@ LEFT, FLOOR = 0.62, 0.1
 """[m] for the names of the rows; z of the lowest panels."""
 
 
-def draw_board(
+def draw_convergence_table(
     scene: Scene,
     rows: tuple[str, ...],
     columns: tuple[str, ...],

@@ -9,7 +9,7 @@ from labs.algorithms import sqp
 from labs.algorithms.sqp import SqpIterate
 from labs.optimal_control.direct_methods.methods import TRANSCRIPTIONS, Transcription, transcribe
 from labs.optimal_control.direct_methods.params import DirectMethodsParams
-from labs.optimal_control.direct_methods.structure import ProgramStructure, structure_of
+from labs.optimal_control.direct_methods.structure import ProgramStructure, program_structure
 from labs.resumable import Resumable, run_to_completion
 from labs.tasks.direct.guesses import Guess, first_guess, start_guess
 from labs.tasks.direct.history import IterationHistory
@@ -17,7 +17,7 @@ from labs.tasks.direct.trajectory import PiecewiseTrajectory
 
 
 @dataclass(frozen=True, eq=False)
-class Entrant:
+class MethodRun:
     """How far one method is. Arrays are never written into again."""
 
     motion: PiecewiseTrajectory
@@ -34,34 +34,34 @@ class Entrant:
         return bool(self.stopped) and not self.converged
 
 
-Entrants = Mapping[str, Entrant]
+MethodRuns = Mapping[str, MethodRun]
 """By the keys of TRANSCRIPTIONS."""
 
 
-def lined_up(params: DirectMethodsParams) -> Entrants:
+def initial_runs(params: DirectMethodsParams) -> MethodRuns:
     """Before the first iteration."""
     race = {}
     for name, method in _transcriptions(params).items():
         at = sqp.init(
             method.program, method.variables(first_guess(params, params.N)), params.options
         )
-        race[name] = run_to_completion(_entrant(params, method, at))
+        race[name] = run_to_completion(_initial_run(params, method, at))
     return race
 
 
-def run_race(
-    params: DirectMethodsParams, before: Entrants, seconds: dict[str, float]
-) -> Iterator[Entrants | None]:
+def run_methods(
+    params: DirectMethodsParams, before: MethodRuns, seconds: dict[str, float]
+) -> Iterator[MethodRuns | None]:
     """The race after each iteration of all that still go on; None within. `seconds` gets what an
     iteration of each took on average [s]."""
     methods = _transcriptions(params)
-    iterates, race = dict[str, SqpIterate](), dict[str, Entrant]()
+    iterates, race = dict[str, SqpIterate](), dict[str, MethodRun]()
     total = dict.fromkeys(methods, 0.0)
     for name, method in methods.items():
         guess = start_guess(params, before[name].motion, before[name].reusable, params.N)
         y = method.variables(guess)
         iterates[name] = sqp.init(method.program, y, params.options)
-        race[name] = yield from _entrant(params, method, iterates[name])
+        race[name] = yield from _initial_run(params, method, iterates[name])
     if all(at.stopped for at in iterates.values()):
         yield dict(race)
     while not all(at.stopped for at in iterates.values()):
@@ -69,26 +69,28 @@ def run_race(
             at = iterates[name]
             if at.stopped:
                 continue
-            at = yield from sqp.step_in_pieces(method.program, params.options, at)
+            at = yield from sqp.resumable_step(method.program, params.options, at)
             yield None
             iterates[name] = at
             total[name] += sum(at.seconds.values())
             seconds[name] = total[name] / max(at.iteration, 1)
-            race[name] = yield from _later(params, method, race[name], at)
+            race[name] = yield from _updated_run(params, method, race[name], at)
         yield dict(race)
 
 
-def verdict(race: Entrants) -> str:
+def outcome_message(race: MethodRuns) -> str:
     """How all of them ended, in a line."""
     if all(entrant.converged for entrant in race.values()):
         counts = [
             f"{TRANSCRIPTIONS[name].lower()} {at.history.iterations}" for name, at in race.items()
         ]
         return f"All three converged. Iterations: {', '.join(counts)}."
-    return " ".join(f"{TRANSCRIPTIONS[name]}: {_short(entrant)}" for name, entrant in race.items())
+    return " ".join(
+        f"{TRANSCRIPTIONS[name]}: {_short_message(entrant)}" for name, entrant in race.items()
+    )
 
 
-def _short(entrant: Entrant) -> str:
+def _short_message(entrant: MethodRun) -> str:
     """The first thing that its sentence says, for there are three of them."""
     if entrant.converged:
         n = entrant.history.iterations
@@ -101,9 +103,9 @@ def _transcriptions(params: DirectMethodsParams) -> Mapping[str, Transcription]:
     return transcribe(params.problem, params.N, params.m, params.M)
 
 
-def _entrant(
+def _initial_run(
     params: DirectMethodsParams, method: Transcription, at: SqpIterate
-) -> Resumable[Entrant]:
+) -> Resumable[MethodRun]:
     """At its first guess; at rest at the start where that diverges."""
     shown = at
     if not np.isfinite(at.values.f):
@@ -112,17 +114,17 @@ def _entrant(
         y = method.variables(Guess(X, U, params.horizon))
         shown = sqp.init(method.program, y, params.options)
     motion = method.motion(shown)
-    structure = yield from structure_of(method, shown, params.task.u_0, whole=False)
-    return Entrant(motion, IterationHistory.start(params, shown, motion), structure, at.stopped)
+    structure = yield from program_structure(method, shown, params.task.u_0, whole=False)
+    return MethodRun(motion, IterationHistory.start(params, shown, motion), structure, at.stopped)
 
 
-def _later(
-    params: DirectMethodsParams, method: Transcription, before: Entrant, at: SqpIterate
-) -> Resumable[Entrant]:
+def _updated_run(
+    params: DirectMethodsParams, method: Transcription, before: MethodRun, at: SqpIterate
+) -> Resumable[MethodRun]:
     """An iteration later; once it has stopped, with all that is told of its programme."""
     motion, structure = method.motion(at), before.structure
     if at.stopped:
-        structure = yield from structure_of(method, at, params.task.u_0, whole=True)
+        structure = yield from program_structure(method, at, params.task.u_0, whole=True)
     history = before.history.append(params, at, motion)
     return replace(
         before,

@@ -8,7 +8,7 @@ from typing import Any
 log = logging.getLogger("orclab.tasks")
 
 
-class Tasks:
+class BackgroundTasks:
     """Keeps what it was given to do alive until it is done, and tells what failed."""
 
     def __init__(self) -> None:
@@ -18,14 +18,14 @@ class Tasks:
         """Begins `work`; nobody waits for it."""
         task = asyncio.create_task(work)
         self._running.add(task)
-        task.add_done_callback(self._done)
+        task.add_done_callback(self._log_failure)
 
     def cancel(self) -> None:
         """Cancels all that still runs."""
         for task in self._running:
             task.cancel()
 
-    def _done(self, task: asyncio.Task[Any]) -> None:
+    def _log_failure(self, task: asyncio.Task[Any]) -> None:
         self._running.discard(task)
         if not task.cancelled() and (error := task.exception()):
             log.error("a task in the background failed", exc_info=error)

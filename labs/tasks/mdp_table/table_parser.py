@@ -36,11 +36,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from labs.errors import LabError
-from labs.number_texts import parse_number, shorten
+from labs.number_texts import parse_number, truncate
 
 MAX_COST = 1e6
 """Of a cost, either sign."""
-NEGLIGIBLE = 1e-9
+PROBABILITY_TOLERANCE = 1e-9
 """So far a probability may be from 0 and 1 and still be one of them: rounding."""
 HEADINGS = {
     "state": ("state", "from", "s", "source", "current state"),
@@ -52,11 +52,11 @@ HEADINGS = {
     "end": ("terminal", "terminated", "done", "end"),
 }
 """What the columns of a long table may be called, ..."""
-MEANT = {word: name for name, words in HEADINGS.items() for word in words}
-HEADINGS_OF_WIDE = {"state": "state", "from": "state", "control": "control", "action": "control"}
-HEADINGS_OF_WIDE |= {"cost": "cost", "reward": "reward"}
+COLUMN_OF_HEADING = {word: name for name, words in HEADINGS.items() for word in words}
+WIDE_HEADINGS = {"state": "state", "from": "state", "control": "control", "action": "control"}
+WIDE_HEADINGS |= {"cost": "cost", "reward": "reward"}
 """... and of a wide one, whose other columns are states."""
-TRUE, FALSE = ("1", "1.0", "true", "yes", "x"), ("", "0", "0.0", "false", "no")
+TRUE_WORDS, FALSE_WORDS = ("1", "1.0", "true", "yes", "x"), ("", "0", "0.0", "false", "no")
 
 
 @dataclass(frozen=True)
@@ -71,15 +71,15 @@ class TableRow:
     """The probabilities of the next states."""
     long: bool
     """Whether it is one of several for the same state and control."""
-    ends: tuple[str, ...] = ()
+    terminal_states: tuple[str, ...] = ()
     """States it says are terminal."""
 
     @property
     def name(self) -> str:
-        return _name(self.number, self.state, self.control)
+        return _row_name(self.number, self.state, self.control)
 
 
-def read_entries(text: str) -> tuple[list[TableRow], tuple[str, ...]]:
+def read_rows(text: str) -> tuple[list[TableRow], tuple[str, ...]]:
     """The rows, and what was understood otherwise than written. Raises LabError."""
     text = text.replace("\ufeff", "")
     reader = _read_json if text.lstrip()[:1] in ("[", "{") else _read_csv
@@ -101,12 +101,12 @@ def _read_csv(text: str, rewarded: list[str]) -> Iterator[TableRow]:
     except (csv.Error, TypeError) as error:
         raise LabError(f"the table cannot be read: {error}") from None
     cells = [line for line in cells if any(line)]
-    heading = _without_trailing(cells[0]) if cells else []
-    columns, long = _columns(heading, cells[1:])
+    heading = _strip_trailing_empty(cells[0]) if cells else []
+    columns, long = _parse_heading(heading, cells[1:])
     for number, line in enumerate(cells[1:], 1):
         if len(line) > len(columns):
-            line = line[: len(columns)] + _without_trailing(line[len(columns) :])
-        name = _name(number, line[0])
+            line = line[: len(columns)] + _strip_trailing_empty(line[len(columns) :])
+        name = _row_name(number, line[0])
         if len(line) != len(columns):
             raise LabError(f"{name}: {len(line)} entries for {len(columns)} columns")
         row: dict[str, Any] = dict(zip(columns, line, strict=True))
@@ -116,17 +116,17 @@ def _read_csv(text: str, rewarded: list[str]) -> Iterator[TableRow]:
         if not long:
             first = {k: row.pop(k) for k in ("state", "control", "cost", "reward") if k in row}
             row = first | {"to": row if any(row.values()) else {first["state"]: 1}}
-        yield _entry(number, row, rewarded, "to" if long else "")
+        yield _parse_row(number, row, rewarded, "to" if long else "")
 
 
-def _columns(columns: Sequence[str], rows: Sequence[list[str]]) -> tuple[list[str], bool]:
+def _parse_heading(columns: Sequence[str], rows: Sequence[list[str]]) -> tuple[list[str], bool]:
     """The columns by the names used here, and whether the table is long."""
     lower = [column.lower() for column in columns]
-    named = [MEANT.get(column, "") for column in lower]
+    named = [COLUMN_OF_HEADING.get(column, "") for column in lower]
     _check_headings(columns, named, rows)
     long = "to" in named and all(named)
     if not long:
-        named = [HEADINGS_OF_WIDE.get(low, own) for low, own in zip(lower, columns, strict=True)]
+        named = [WIDE_HEADINGS.get(low, own) for low, own in zip(lower, columns, strict=True)]
     if not columns or named[0] != "state":
         raise LabError(
             "the heading of a table begins with state, then control and cost where there are any, "
@@ -150,13 +150,13 @@ def _check_headings(
     cells = (row[k] for row in rows for k in strange if k < len(row))
     if strange and ("to" in named or any(re.match(r"[^\W\d]", cell) for cell in cells)):
         raise LabError(
-            f"{', '.join(shorten(columns[k]) for k in strange[:5])}? The columns of a table are "
+            f"{', '.join(truncate(columns[k]) for k in strange[:5])}? The columns of a table are "
             "from, action, to, probability, cost or reward, terminal; or state, action, cost, and "
             "one for each state, which has a row"
         )
 
 
-def _without_trailing(cells: Sequence[str]) -> list[str]:
+def _strip_trailing_empty(cells: Sequence[str]) -> list[str]:
     """Cells without the empty ones that delimiters at the end of a line make."""
     kept = list(cells)
     while kept and not kept[-1]:
@@ -166,38 +166,38 @@ def _without_trailing(cells: Sequence[str]) -> list[str]:
 
 def _read_json(text: str, rewarded: list[str]) -> Iterator[TableRow]:
     try:
-        rows = json.loads(_json_of_python(text), parse_int=float)
+        rows = json.loads(_python_to_json(text), parse_int=float)
     except (ValueError, RecursionError) as error:
         raise LabError(f"the table is not sound JSON: {error}") from None
     if isinstance(rows, dict):
         rows = list(_gymnasium_rows(rows))
     for number, row in enumerate(rows, 1):
-        named = _by_meaning(row) if isinstance(row, dict) else {}
+        named = _normalize_keys(row) if isinstance(row, dict) else {}
         if not isinstance(named.get("to"), dict | str | float):
             raise LabError(
                 f'row {number}: a row is {{"state": "A", "cost": 1, "to": {{"A": 1}}}}, '
                 'with a "control" where there are any; or {"from": "A", "to": "A", '
                 '"probability": 1}'
             )
-        strange = [shorten(key) for key in named if key not in HEADINGS]
+        strange = [truncate(key) for key in named if key not in HEADINGS]
         if strange:
             raise LabError(
                 f"row {number}: {', '.join(sorted(strange)[:5])}? A row has state, control, cost, "
                 "to, or from, action, to, probability, reward, terminal, each once"
             )
-        yield _entry(number, named, rewarded, "" if isinstance(named["to"], dict) else "to")
+        yield _parse_row(number, named, rewarded, "" if isinstance(named["to"], dict) else "to")
 
 
-def _by_meaning(row: Mapping[str, Any]) -> dict[str, Any]:
+def _normalize_keys(row: Mapping[str, Any]) -> dict[str, Any]:
     """A row by the names used here; what is strange, or there twice, by its own."""
     named: dict[str, Any] = {}
     for key, value in row.items():
-        meant = MEANT.get(key.strip().lower(), key)
+        meant = COLUMN_OF_HEADING.get(key.strip().lower(), key)
         named[f"{key} again" if meant in named else meant] = value
     return named
 
 
-def _json_of_python(text: str) -> str:
+def _python_to_json(text: str) -> str:
     """JSON of a dictionary P that was printed: {0: {1: [(1.0, np.int64(0), -1, False)]}}."""
     if not re.match(r"\s*\{\s*\d", text):
         return text
@@ -224,50 +224,54 @@ def _gymnasium_rows(P: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
         ) from None
 
 
-def _entry(number: int, row: Mapping[str, Any], rewarded: list[str], long: str) -> TableRow:
-    state, control = (_word(row.get(key, "")) for key in ("state", "control"))
-    name = _name(number, state, control)
+def _parse_row(number: int, row: Mapping[str, Any], rewarded: list[str], long: str) -> TableRow:
+    state, control = (_parse_name(row.get(key, "")) for key in ("state", "control"))
+    name = _row_name(number, state, control)
     if not state:
         raise LabError(f"row {number}: it does not name its state")
-    cost = _number(row.get("cost", 0), name, "cost") - _number(row.get("reward", 0), name, "reward")
+    cost = _parse_number(row.get("cost", 0), name, "cost") - _parse_number(
+        row.get("reward", 0), name, "reward"
+    )
     if "reward" in row:
         rewarded.append(name)
     if abs(cost) > MAX_COST:
         raise LabError(f"{name}: the cost {cost:g} is beyond {MAX_COST:g}")
     if not long:
-        to = {str(y).strip(): _probability(p, name, str(y)) for y, p in row["to"].items()}
+        to = {str(y).strip(): _parse_probability(p, name, str(y)) for y, p in row["to"].items()}
         return TableRow(number, state, control, cost + 0.0, to, False)
-    ahead = _word(row["to"])
+    ahead = _parse_name(row["to"])
     if not ahead:
         raise LabError(f"{name}: it does not say where it leads to")
     given = row.get("p", 1)
-    p = _probability(1 if given == "" else given, name, ahead)
+    p = _parse_probability(1 if given == "" else given, name, ahead)
     end = str(row.get("end", "")).strip().lower()
-    if end not in TRUE + FALSE:
-        raise LabError(f"{name}: {shorten(end)!r} for terminal is neither true nor false")
-    return TableRow(number, state, control, cost + 0.0, {ahead: p}, True, (ahead,) * (end in TRUE))
+    if end not in TRUE_WORDS + FALSE_WORDS:
+        raise LabError(f"{name}: {truncate(end)!r} for terminal is neither true nor false")
+    return TableRow(
+        number, state, control, cost + 0.0, {ahead: p}, True, (ahead,) * (end in TRUE_WORDS)
+    )
 
 
-def _word(value: object) -> str:
+def _parse_name(value: object) -> str:
     """The name of a state or a control; that of a number is the number."""
     return f"{value:g}" if isinstance(value, float) else str(value).strip()
 
 
-def _probability(entry: object, name: str, column: str) -> float:
-    value = _number(entry, name, column)
-    if not -NEGLIGIBLE <= value <= 1.0 + NEGLIGIBLE:
+def _parse_probability(entry: object, name: str, column: str) -> float:
+    value = _parse_number(entry, name, column)
+    if not -PROBABILITY_TOLERANCE <= value <= 1.0 + PROBABILITY_TOLERANCE:
         raise LabError(f"{name}: {value:.12g} for {column}: a probability is from 0 to 1")
     return min(max(value, 0.0), 1.0)
 
 
-def _number(entry: object, name: str, column: str) -> float:
+def _parse_number(entry: object, name: str, column: str) -> float:
     """A number, or a fraction; an empty entry is 0."""
     try:
         return parse_number(str(entry).strip() or "0")
     except ValueError:
-        raise LabError(f"{name}: {shorten(str(entry))!r} for {column} is not a number") from None
+        raise LabError(f"{name}: {truncate(str(entry))!r} for {column} is not a number") from None
 
 
-def _name(number: int, state: str, control: str = "") -> str:
+def _row_name(number: int, state: str, control: str = "") -> str:
     """Of a row, in errors."""
     return f"row {number} ({', '.join(filter(None, (state, control)))})"

@@ -13,22 +13,22 @@ from typing import Any
 import numpy as np
 import viser
 
-from labs.engine.catalog import find
-from labs.engine.headless import run
+from labs.engine.catalog import find_lab
+from labs.engine.headless import run_headless
 from labs.engine.plot_data import PlotData
 from labs.engine.run import World
 from labs.engine.solution import Solution
 from labs.errors import LabError
-from server.broadcast import FRAME, Broadcast, Controls
-from server.mailbox import Item, Mailbox
-from server.messages import Compared, View
+from server.broadcast import FRAME_PERIOD, Broadcast, SessionControls
+from server.mailbox import Mailbox, WorkItem
+from server.messages import ComparedRun, View
 from server.pacing import Pacer
 from server.panel import Panel
-from server.pipe import CONTROL, STREAM, Link
+from server.pipe import CONTROL, STREAM, WorkerPipe
 from server.solver_clock import SolverClock
 from server.viser_scene import ViserScene
 
-BUSY = 0.8 * FRAME
+FRAME_BUDGET = 0.8 * FRAME_PERIOD
 """[s] What the world, and then the solver, may compute in a frame."""
 COMPARED_ROWS = 600
 """Of a run compared with: about one a pixel of a plot."""
@@ -41,11 +41,11 @@ class LiveSession:
     view, running, speed, and the solver's last status."""
 
     def __init__(
-        self, link: Link, mailbox: Mailbox, server: viser.ViserServer, opening: dict[str, Any]
+        self, link: WorkerPipe, mailbox: Mailbox, server: viser.ViserServer, opening: dict[str, Any]
     ) -> None:
         self.link, self.mailbox = link, mailbox
-        self.world = World(find(opening["lab"]), opening["params"], opening["seed"])
-        self.controls = Controls(self.world, opening["running"], View(**opening["view"]))
+        self.world = World(find_lab(opening["lab"]), opening["params"], opening["seed"])
+        self.controls = SessionControls(self.world, opening["running"], View(**opening["view"]))
         self.pacer = Pacer(self.world, opening["speed"])
         self.solver = SolverClock(self.world, opening["solver"])
         self.scene = ViserScene(server, mailbox, self.controls.view)
@@ -59,22 +59,22 @@ class LiveSession:
             for item in self.mailbox.take(wake - time.perf_counter()):
                 self._dispatch(item)
             now = time.perf_counter()
-            self.broadcast.note_wake(now - wake)
-            with self._guard():
-                if self.controls.moving:
-                    self.pacer.advance(now, until=now + BUSY)
-                    self._hold_if_due()
+            self.broadcast.record_lateness(now - wake)
+            with self._catch_failures():
+                if self.controls.time_advances:
+                    self.pacer.advance(now, until=now + FRAME_BUDGET)
+                    self._pause_if_due()
                 if not self.controls.failure:
-                    self.solver.iterate(now, until=now + BUSY)
-            with self._guard():
+                    self.solver.iterate(now, until=now + FRAME_BUDGET)
+            with self._catch_failures():
                 self.broadcast.send_samples(now)
-            with self._guard():
+            with self._catch_failures():
                 self.broadcast.draw(now)
             self.broadcast.send_due_status(now)
 
     # What the user does -----------------------------------------------------------------------
 
-    def _dispatch(self, item: Item) -> None:
+    def _dispatch(self, item: WorkItem) -> None:
         error = ""
         answer: Any = None
         try:
@@ -86,7 +86,7 @@ class LiveSession:
             error = str(refused)
             self.panel.show(self.world.params)  # puts a refused value back
         except Exception as broken:
-            error = self._fail(broken)
+            error = self._report_failure(broken)
         self.broadcast.request_update()
         if item.ref is not None:
             # The status goes first: who has the answer finds the session as it is now.
@@ -96,7 +96,7 @@ class LiveSession:
     def _do_params(self, changes: dict[str, Any]) -> dict[str, Any]:
         runs = self.world.runs
         self.world.change(changes)
-        self._changed(restarted=self.world.runs != runs)
+        self._on_change(restarted=self.world.runs != runs)
         return self.world.params.model_dump()
 
     def _do_apply(
@@ -122,14 +122,14 @@ class LiveSession:
                 self.solver.dispatch("run")
         self.pacer.hold = hold
         if compared:
-            self.link.send(STREAM, Compared(self.world.runs, *compared))
+            self.link.send(STREAM, ComparedRun(self.world.runs, *compared))
         return answer
 
     def _make_comparison(
         self, params: dict[str, Any], seconds: float
     ) -> tuple[list[str], np.ndarray]:
         """Another world's run, which leaves this one's recording and events alone."""
-        recorder = run(
+        recorder = run_headless(
             self.world.entry.slug,
             params,
             seconds=seconds,
@@ -139,15 +139,15 @@ class LiveSession:
         rows = recorder.since(0).astype("float32")
         return recorder.columns, rows[:: 1 + len(rows) // COMPARED_ROWS]
 
-    def _hold_if_due(self) -> None:
-        if self.pacer.is_held():
+    def _pause_if_due(self) -> None:
+        if self.pacer.is_hold_due():
             self.pacer.hold = None
             self._do_pause()
             self.broadcast.request_update()
 
     def _do_run(self) -> None:
         self.controls.running = True
-        self.pacer.anchor()
+        self.pacer.resync()
 
     def _do_pause(self) -> None:
         self.controls.running = False
@@ -166,11 +166,11 @@ class LiveSession:
     def _restart(self, seed: int) -> None:
         self.controls.failure = ""
         self.world.reset(seed)
-        self._changed(restarted=True)
+        self._on_change(restarted=True)
 
     def _do_speed(self, factor: float) -> None:
         self.pacer.speed = factor
-        self.pacer.anchor()
+        self.pacer.resync()
 
     def _do_press(self, action: str) -> None:
         self.world.press(action)
@@ -178,14 +178,14 @@ class LiveSession:
     def _do_hold(self, handle: str, point: tuple[float, float, float] | None) -> None:
         runs = self.world.runs
         self.world.hold(handle, point)
-        self._changed(restarted=self.world.runs != runs)
+        self._on_change(restarted=self.world.runs != runs)
 
     def _do_load(self, path: str) -> dict[str, Any]:
         """Takes up a saved solution; the solver waits then."""
         self.world.load(Solution.read(Path(path).read_bytes()))
         self.controls.failure = ""
         self.solver.dispatch("pause")
-        self._changed(restarted=True)
+        self._on_change(restarted=True)
         return self.world.params.model_dump()
 
     def _do_view(self, view: dict[str, Any]) -> None:
@@ -204,15 +204,15 @@ class LiveSession:
         return self.world.command()
 
     def _do_export(self, form: str, path: str, done: int) -> None:
-        self._write(functools.partial(self.world.recording().write, form), path, done)
+        self._write_file(functools.partial(self.world.recording().write, form), path, done)
 
     def _do_solution(self, form: str, path: str, done: int) -> None:
-        self._write(functools.partial(self.world.solution().write, form), path, done)
+        self._write_file(functools.partial(self.world.solution().write, form), path, done)
 
     def _do_plots(self, form: str, path: str, done: int, titles: list[str]) -> None:
-        self._write(functools.partial(PlotData.of(self.world, titles).write, form), path, done)
+        self._write_file(functools.partial(PlotData.of(self.world, titles).write, form), path, done)
 
-    def _write(self, content: Callable[[], bytes], path: str, done: int) -> None:
+    def _write_file(self, content: Callable[[], bytes], path: str, done: int) -> None:
         """Writes to `path`, on a thread of its own, and then answers `done`."""
 
         def write() -> None:
@@ -227,25 +227,25 @@ class LiveSession:
 
         threading.Thread(target=write, daemon=True).start()
 
-    def _changed(self, restarted: bool) -> None:
+    def _on_change(self, restarted: bool) -> None:
         self.panel.show(self.world.params)
         if restarted:
             self.pacer.hold = None
-            self.pacer.anchor()
+            self.pacer.resync()
 
     # When the lab itself breaks -----------------------------------------------------------------
 
     @contextlib.contextmanager
-    def _guard(self) -> Iterator[None]:
+    def _catch_failures(self) -> Iterator[None]:
         """A defect of a lab stops its world, not its session."""
         try:
             yield
         except OSError:
             raise  # the pipe: the end of this process
         except Exception as error:
-            self._fail(error)
+            self._report_failure(error)
 
-    def _fail(self, error: Exception) -> str:
+    def _report_failure(self, error: Exception) -> str:
         log.exception("the lab failed")
         self.controls.failure = (
             f"The lab failed at t = {self.world.t:.2f} s ({type(error).__name__}: {error}). "

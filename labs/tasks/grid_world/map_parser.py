@@ -14,7 +14,7 @@ from labs.number_texts import parse_number
 
 TRANSLATIONS = {"F": ".", "X": "#", " ": ".", "_": "."}
 """Letters of other maps: FrozenLake's frozen cells, mazes' walls and ways."""
-WORDS = {".": "free", "#": "wall"}
+KIND_NAMES = {".": "free", "#": "wall"}
 MAX_COST = 1e4
 """Of a cell, either sign."""
 _LEGEND = re.compile(r"\s*(\S)\s*[=:]\s*(\S.*)")
@@ -23,28 +23,28 @@ _VALUE = re.compile(r"(?:(cost|reward)\s+)?([-+−]?[\d./]{1,20})", re.IGNORECAS
 
 
 @dataclass(frozen=True)
-class Kind:
+class CellKind:
     """What the map says of a letter of its own."""
 
     cost: float
     """Of a step that leads there."""
-    ends: bool
+    terminal: bool
     """Whether the episode ends there."""
 
 
 @dataclass(frozen=True)
-class Reading:
+class ParsedMap:
     """A map, its rows still in all lengths."""
 
     rows: list[str]
     wind: tuple[int, ...]
     """A last row of digits; empty where there is none."""
-    legend: dict[str, Kind]
+    legend: dict[str, CellKind]
     notes: tuple[str, ...]
     """What was understood otherwise than written, in sentences."""
 
 
-def read_map(text: str, known: Mapping[str, str], ending: Container[str]) -> Reading:
+def parse_map(text: str, known: Mapping[str, str], ending: Container[str]) -> ParsedMap:
     """The rows of a map, in letters that are `known` or explained in lines below it, such as
 
         m = cost 3            a step there costs 3 more
@@ -53,9 +53,11 @@ def read_map(text: str, known: Mapping[str, str], ending: Container[str]) -> Rea
     where a letter in `ending` ends without saying so. Raises LabError, naming the line."""
     lines = text.replace("\ufeff", "").strip("\r\n").splitlines()
     said = [found for found in map(_LEGEND.fullmatch, lines) if found]
-    legend = {found[1]: _kind(found[0].strip(), found[2], found[1] in ending) for found in said}
-    rows = _rows([line for line in lines if not _LEGEND.fullmatch(line)])
-    if legend.get("C", Kind(0.0, False)).ends or "#" in legend:
+    legend = {
+        found[1]: _parse_kind(found[0].strip(), found[2], found[1] in ending) for found in said
+    }
+    rows = _split_rows([line for line in lines if not _LEGEND.fullmatch(line)])
+    if legend.get("C", CellKind(0.0, False)).terminal or "#" in legend:
         raise LabError("nobody gets into a wall #, and no fall off the cliff C is an end")
     wind = tuple(map(int, rows.pop())) if rows and rows[-1].isdecimal() else ()
     notes: dict[str, str] = {}
@@ -63,7 +65,7 @@ def read_map(text: str, known: Mapping[str, str], ending: Container[str]) -> Rea
     for number, row in enumerate(rows, 1):
         cells = []
         for cell in row:
-            meant = _meaning(cell, known, legend)
+            meant = _map_letter(cell, known, legend)
             if not meant:
                 raise LabError(
                     f"row {number} of the map has {cell!r}: there are "
@@ -72,22 +74,22 @@ def read_map(text: str, known: Mapping[str, str], ending: Container[str]) -> Rea
                 )
             if meant != cell:
                 name = "a space" if cell == " " else cell
-                word = f" ({WORDS[meant]})" if meant in WORDS else ""
+                word = f" ({KIND_NAMES[meant]})" if meant in KIND_NAMES else ""
                 notes[cell] = f"{name} as {meant}{word}"
             cells.append(meant)
         understood.append("".join(cells))
     sentences = (f"Read {', '.join(notes.values())}.",) if notes else ()
-    return Reading(understood, wind, legend, sentences)
+    return ParsedMap(understood, wind, legend, sentences)
 
 
-def _meaning(cell: str, known: Container[str], legend: Container[str]) -> str:
+def _map_letter(cell: str, known: Container[str], legend: Container[str]) -> str:
     for meant in (cell, cell.upper(), TRANSLATIONS.get(cell.upper(), "")):
         if meant and (meant in known or meant in legend):
             return meant
     return ""
 
 
-def _rows(lines: list[str]) -> list[str]:
+def _split_rows(lines: list[str]) -> list[str]:
     if quoted := _quoted_rows("\n".join(lines)):
         return quoted
     rows = [line.strip() for line in lines if line.strip()]
@@ -122,9 +124,9 @@ def _quoted_rows(text: str) -> list[str]:
     return _QUOTED.findall(text)
 
 
-def _kind(line: str, said: str, ends: bool) -> Kind:
+def _parse_kind(line: str, said: str, ends: bool) -> CellKind:
     cost = 0.0
-    for word in _words(said):
+    for word in _split_words(said):
         if word in ("end", "goal", "terminal"):
             ends = True
             continue
@@ -138,10 +140,10 @@ def _kind(line: str, said: str, ends: bool) -> Kind:
                 "an end: m = cost 3, or T = reward 5, end"
             )
         cost = -value if (found[1] or "").lower() == "reward" else value
-    return Kind(cost + 0.0, ends)
+    return CellKind(cost + 0.0, ends)
 
 
-def _words(said: str) -> Iterator[str]:
+def _split_words(said: str) -> Iterator[str]:
     for word in said.split(","):
         if word.strip():
             yield " ".join(word.lower().split())

@@ -6,11 +6,11 @@ from collections.abc import AsyncIterator
 
 TICK = 0.25
 """[s] Between two ticks."""
-LONGEST = 4 * TICK
+MAX_TICK = 4 * TICK
 """[s] What a tick that came late counts at most."""
 
 
-class WakingClock:
+class UptimeClock:
     """Seconds that passed while this process ran: a laptop's lid was closed, or the process was
     stopped, and nobody fell silent or idle in between."""
 
@@ -34,7 +34,7 @@ class WakingClock:
         """Waits for the next tick, and counts it."""
         await asyncio.sleep(TICK)
         time = asyncio.get_running_loop().time()
-        self.now += min(time - self._last, LONGEST)
+        self.now += min(time - self._last, MAX_TICK)
         self._last = time
         for limit in [limit for limit, end in self._ends.items() if end <= self.now]:
             del self._ends[limit]

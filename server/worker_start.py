@@ -12,7 +12,7 @@ from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
 
 from server import worker_entry
-from server.waking_clock import WakingClock
+from server.uptime_clock import UptimeClock
 
 START_SECONDS = 600.0
 """The first waits until the fork server has loaded and compiled what all workers share, on any
@@ -21,7 +21,7 @@ REFUSALS, REFUSAL_SECONDS = 10, 0.5
 
 
 async def start_worker(
-    context: ForkServerContext, clock: WakingClock
+    context: ForkServerContext, clock: UptimeClock
 ) -> tuple[BaseProcess, socket.socket]:
     """A process that has begun, and our end of its pipe. Raises OSError (of descriptors,
     processes, time), EOFError, RuntimeError."""
@@ -31,7 +31,7 @@ async def start_worker(
             target=worker_entry.main, args=(theirs,), daemon=True, name="orclab-worker"
         )
         async with clock.timeout(START_SECONDS):
-            await _on_a_thread(functools.partial(_begin, process, theirs))
+            await _run_in_thread(functools.partial(_start_process, process, theirs))
     except BaseException as error:
         ours.close()  # a process that begins all the same finds its pipe closed, and ends
         if isinstance(error, TimeoutError):
@@ -41,7 +41,7 @@ async def start_worker(
     return process, ours
 
 
-def _begin(process: BaseProcess, theirs: socket.socket) -> None:
+def _start_process(process: BaseProcess, theirs: socket.socket) -> None:
     """Starts a process with its end of the pipe. A fork server that was killed refuses requests
     until it is gone; then `start` begins another."""
     with theirs:
@@ -52,7 +52,7 @@ def _begin(process: BaseProcess, theirs: socket.socket) -> None:
         process.start()
 
 
-async def _on_a_thread(work: Callable[[], None]) -> None:
+async def _run_in_thread(work: Callable[[], None]) -> None:
     """As `asyncio.to_thread`, but the end of the server does not wait for it."""
     loop = asyncio.get_running_loop()
     done: asyncio.Future[None] = loop.create_future()

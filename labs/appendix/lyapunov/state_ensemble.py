@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labs.appendix.lyapunov.closed_loop import stopped
-from labs.tasks.phase_plane.systems import STEP, PlaneSystem
+from labs.appendix.lyapunov.closed_loop import clip_states
+from labs.tasks.phase_plane.systems import SIMULATION_STEP, PlaneSystem
 
-TAIL = 6
+TRAIL_STEPS = 6
 """Steps of the way that is shown behind each state."""
-STEPS = 120
+RUN_STEPS = 120
 """Of a run, before all start anew."""
 
 
@@ -22,7 +22,7 @@ class StateEnsemble:
     U: np.ndarray
     """(M, 1) held now."""
     tail: np.ndarray
-    """(up to TAIL, M, 2): at the last steps."""
+    """(up to TRAIL_STEPS, M, 2): at the last steps."""
     left: np.ndarray
     """(M,): whether each has left the set."""
     distances: np.ndarray
@@ -37,7 +37,7 @@ class StateEnsemble:
         return len(self.V) - 1
 
 
-def let_loose(starts: np.ndarray) -> StateEnsemble:
+def initial_ensemble(starts: np.ndarray) -> StateEnsemble:
     """At `starts` (M, 2), before the law has looked."""
     none = np.empty((0, len(starts)))
     return StateEnsemble(
@@ -45,20 +45,22 @@ def let_loose(starts: np.ndarray) -> StateEnsemble:
     )
 
 
-def look(runs: StateEnsemble, U: np.ndarray, V: np.ndarray, outside: np.ndarray) -> StateEnsemble:
+def hold_controls(
+    runs: StateEnsemble, U: np.ndarray, V: np.ndarray, outside: np.ndarray
+) -> StateEnsemble:
     """The law has looked and holds U (M, 1); V (M,) now, and which are outside of the set."""
     distances = np.linalg.norm(runs.X, axis=1)
     return replace(
         runs,
         U=U,
-        tail=np.concatenate([runs.tail, runs.X[None]])[-TAIL:],
+        tail=np.concatenate([runs.tail, runs.X[None]])[-TRAIL_STEPS:],
         left=runs.left | outside,
         distances=np.vstack([runs.distances, distances]),
         V=np.vstack([runs.V, V]),
     )
 
 
-def advance(runs: StateEnsemble, system: PlaneSystem, substeps: int) -> StateEnsemble:
+def advance_ensemble(runs: StateEnsemble, system: PlaneSystem, substeps: int) -> StateEnsemble:
     """10 ms later, of `substeps` to the next look."""
-    X = stopped(system.step(runs.X, runs.U, STEP))
+    X = clip_states(system.step(runs.X, runs.U, SIMULATION_STEP))
     return replace(runs, X=X, clock=(runs.clock + 1) % substeps)

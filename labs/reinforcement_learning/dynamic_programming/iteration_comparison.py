@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from labs.algorithms import policy_evaluation, policy_iteration, value_iteration
-from labs.algorithms.bellman import NO_BOUND, Sweep, unbounded_message
-from labs.number_texts import counted
+from labs.algorithms.bellman import NO_ERROR_BOUND, Sweep, unbounded_message
+from labs.number_texts import count_text
 from labs.problems.finite_mdp import FiniteMDP, random_policy
 from labs.rounding import round_up
 
@@ -32,7 +32,7 @@ ITERATION_METHODS = {
 SINGLE_SWEEPS, SHARE, MAX_BATCH = 60, 20, 100
 """Sweeps made one a pass; after those a pass makes one for each SHARE made so far, at most
 MAX_BATCH and ..."""
-BACKUPS = 500_000
+BACKUPS_PER_PASS = 500_000
 """... no more than about as many as take so many backups in each method."""
 MAX_SWEEPS = 10_000
 """Sweeps after which an iteration is given up."""
@@ -40,7 +40,7 @@ FAILED = NOT_BEGUN, GIVEN_UP = "Not begun", "Given up"
 """How the sentence of an iteration begins that has not converged."""
 SMALLEST_SHOWN = 1e-12
 """What a curve shows of an error of 0, on a logarithmic axis."""
-RANDOM = -1
+RANDOM_CONTROL = -1
 """In place of controls: all alike."""
 
 
@@ -61,7 +61,7 @@ class Iterates:
     V: np.ndarray
     """(4, X)."""
     policy: np.ndarray
-    """(4, X) int16; RANDOM throughout where the even random policy is followed."""
+    """(4, X) int16; RANDOM_CONTROL throughout where the even random policy is followed."""
     count: np.ndarray
     """(4,) sweeps."""
     evaluations: np.ndarray
@@ -93,8 +93,8 @@ class Iterates:
         if short:
             return " ".join(short)
         left = f"the largest distance left is {round_up(self.errors[-1].max())}."
-        if any(NO_BOUND in done for done in self.done):
-            return f"All four iterations have stopped; {NO_BOUND}: {left}"
+        if any(NO_ERROR_BOUND in done for done in self.done):
+            return f"All four iterations have stopped; {NO_ERROR_BOUND}: {left}"
         return f"All four iterations have converged: {left}"
 
     @property
@@ -108,22 +108,22 @@ def initial_iterates(
 ) -> Iterates:
     """Before the first sweep. V (4, X); policy (4, X), of which the first two are followed to
     begin with; limits (4, X), infinite where there is none: such an iteration does not begin."""
-    done = tuple(_without_limit(limit) for limit in limits)
+    done = tuple(_not_begun_message(limit) for limit in limits)
     if not done[1] and mdp.gamma == 1.0:
-        first = policy_evaluation.exact(mdp, unpack_policy(mdp, policy[1]))
-        done = (done[0], _without_limit(first, "under the policy it starts from"), *done[2:])
+        first = policy_evaluation.exact_values(mdp, unpack_policy(mdp, policy[1]))
+        done = (done[0], _not_begun_message(first, "under the policy it starts from"), *done[2:])
     fresh = np.zeros((1, 4), np.int64)
     errors = _distances(V, limits)[None]
     return Iterates(V, policy, fresh[0], np.array([0, 1, 0, 0]), errors, fresh, done)
 
 
-def passes(
+def run_passes(
     mdp: FiniteMDP, at: Iterates, settings: IterationSettings, limits: np.ndarray
 ) -> Iterator[tuple[Iterates, np.ndarray]]:
     """The passes after `at` until all are done, none if they are; with the wall-clock time (4,)
     [s] each pass took."""
     while not at.over:
-        at, seconds = _pass(mdp, at, settings, limits)
+        at, seconds = _run_pass(mdp, at, settings, limits)
         yield at, seconds
 
 
@@ -142,18 +142,18 @@ def progress(at: Iterates, tolerance: float) -> float | None:
     return min(parts, default=None)
 
 
-def _pass(
+def _run_pass(
     mdp: FiniteMDP, at: Iterates, settings: IterationSettings, limits: np.ndarray
 ) -> tuple[Iterates, np.ndarray]:
     made = len(at.errors) - 1
-    affordable = max(1, BACKUPS // (mdp.X * mdp.U))
+    affordable = max(1, BACKUPS_PER_PASS // (mdp.X * mdp.U))
     sweeps = 1 if made < SINGLE_SWEEPS else min(made // SHARE, MAX_BATCH, affordable)
     sweeps = min(sweeps, MAX_SWEEPS - made)
     errors = np.vstack([at.errors, np.tile(at.errors[-1], (sweeps, 1))])
     backups = np.vstack([at.backups, np.tile(at.backups[-1], (sweeps, 1))])
     ends, done, seconds = [], list(at.done), np.zeros(4)
     for i, method in enumerate(ITERATION_METHODS):
-        sweep = _sweep(mdp, at, i)
+        sweep = _sweep_of_method(mdp, at, i)
         for k in range(made + 1, made + 1 + sweeps):
             if sweep.done:
                 break
@@ -190,7 +190,7 @@ def _step(method: str, mdp: FiniteMDP, at: Sweep, settings: IterationSettings) -
             return value_iteration.step(mdp, at, settings.tolerance)
 
 
-def _sweep(mdp: FiniteMDP, at: Iterates, i: int) -> Sweep:
+def _sweep_of_method(mdp: FiniteMDP, at: Iterates, i: int) -> Sweep:
     return Sweep(
         V=at.V[i],
         policy=unpack_policy(mdp, at.policy[i]),
@@ -203,14 +203,14 @@ def _sweep(mdp: FiniteMDP, at: Iterates, i: int) -> Sweep:
 
 def _pack_policy(policy: np.ndarray) -> np.ndarray:
     if policy.ndim == 2:
-        return np.full(len(policy), RANDOM, np.int16)
+        return np.full(len(policy), RANDOM_CONTROL, np.int16)
     return policy.astype(np.int16)
 
 
 def unpack_policy(mdp: FiniteMDP, policy: np.ndarray) -> np.ndarray:
     """A row (X,) of `Iterates.policy` as the algorithms take it: controls (X,), or where it is
-    RANDOM the even probabilities (X, U)."""
-    return random_policy(mdp) if policy[0] == RANDOM else policy.astype(np.int64)
+    RANDOM_CONTROL the even probabilities (X, U)."""
+    return random_policy(mdp) if policy[0] == RANDOM_CONTROL else policy.astype(np.int64)
 
 
 def _distances(V: np.ndarray, limits: np.ndarray) -> np.ndarray:
@@ -220,7 +220,7 @@ def _distances(V: np.ndarray, limits: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(found), found, 0.0)
 
 
-def _without_limit(limit: np.ndarray, why: str = "") -> str:
+def _not_begun_message(limit: np.ndarray, why: str = "") -> str:
     message = unbounded_message(limit, why)
     return f"{NOT_BEGUN}: {message}" if message else ""
 
@@ -248,8 +248,8 @@ def iteration_report(at: Iterates, seconds: Mapping[str, object]) -> str:
         spent = seconds.get(method)
         took = f", {1e3 * spent:.3g} ms" if isinstance(spent, float) and spent else ""
         lines.append(
-            f"{name}: {counted(int(at.count[i]), 'sweep')}, "
-            f"{counted(int(at.backups[-1, i]), 'backup')}{took}. "
+            f"{name}: {count_text(int(at.count[i]), 'sweep')}, "
+            f"{count_text(int(at.backups[-1, i]), 'backup')}{took}. "
             f"{at.done[i] or 'On its way.'}"
         )
     return "\n".join(lines)

@@ -22,8 +22,9 @@ from tests.labs.contract import (
     settings,
 )
 
-SHORT, LONG = 150, 1000
-"""Operations of a session in every run of the tests, and in a study."""
+SHORT, LONG = {True: 75, False: 150}, 1000
+"""Operations of a session in every run of the tests, fewer for labs with a solver; and in a
+study."""
 OPERATION_WEIGHTS = {
     "change": 0.4,
     "advance": 0.2,
@@ -152,7 +153,7 @@ every_lab = pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.sl
 
 @every_lab
 def test_whatever_is_done_the_world_is_well(entry: CatalogEntry) -> None:
-    play(entry, 1, SHORT)
+    play(entry, 1, SHORT[entry.lab.has_solver()])
 
 
 @pytest.mark.study

@@ -1,4 +1,4 @@
-"""Arrays that are never written into."""
+"""Small functions of arrays, which they never write into."""
 
 from collections.abc import Mapping
 
@@ -13,3 +13,9 @@ def with_row(array: np.ndarray, i: int, row: np.ndarray | float) -> np.ndarray:
     changed = array.copy()
     changed[i] = row
     return changed
+
+
+def clip_norm(vector: np.ndarray, longest: float) -> np.ndarray:
+    """`vector`, scaled down where its length exceeds `longest`."""
+    length = float(np.linalg.norm(vector))
+    return vector if length <= longest else vector * (longest / length)

@@ -34,7 +34,7 @@ def section(title: str) -> str:
 
 
 def test_start_and_test_take_one_line_each() -> None:
-    for title in ("Start", "Test"):
+    for title in ("Getting started", "Testing"):
         (line,) = re.findall(r"```sh\n(.*?)\n```", section(title), flags=re.S)
         assert "\n" not in line
         assert line.startswith("python3 -m venv .venv && .venv/bin/pip install -q ")
@@ -42,7 +42,7 @@ def test_start_and_test_take_one_line_each() -> None:
 
 def test_ci_runs_the_test_command_of_the_readme() -> None:
     path = ROOT / ".ci" / "run"
-    (line,) = re.findall(r"```sh\n(.*?)\n```", section("Test"), flags=re.S)
+    (line,) = re.findall(r"```sh\n(.*?)\n```", section("Testing"), flags=re.S)
     assert path.read_text().rstrip().endswith(f"\n{line}")
     assert os.access(path, os.X_OK)
     subprocess.run(["bash", "-n", str(path)], check=True)
@@ -116,7 +116,9 @@ def test_the_lab_of_the_readme_is_a_lab(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 def test_the_readme_lists_every_setting_with_its_default() -> None:
-    rows = dict(re.findall(r"^\| `(ORCLAB_\w+)` \| `?([^`|]*?)`?\s*\|", section("Configure"), re.M))
+    rows = dict(
+        re.findall(r"^\| `(ORCLAB_\w+)` \| `?([^`|]*?)`?\s*\|", section("Configuration"), re.M)
+    )
     defaults = {
         f"ORCLAB_{name.upper()}": field.default for name, field in Settings.model_fields.items()
     }
@@ -134,7 +136,7 @@ def test_the_readme_names_the_keys_the_help_names() -> None:
         (re.sub(r"<[^>]+>", "", keys).strip(), re.sub(r"<[^>]+>", "", does).strip())
         for keys, does in re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", text)
     ]
-    told = re.findall(r"^\| `?([^|`]+?)`? \| ([^|]+?) \|$", section("Use"), re.M)
+    told = re.findall(r"^\| `?([^|`]+?)`? \| ([^|]+?) \|$", section("Usage"), re.M)
     told = [(keys, does) for keys, does in told if keys not in ("Key", "---")]
     assert len(told) > 8
     assert [keys for keys, _ in told] == [keys for keys, _ in helped if keys != "Esc"]

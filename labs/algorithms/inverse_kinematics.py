@@ -76,12 +76,6 @@ def pose_error(placement: pin.SE3, target: pin.SE3) -> np.ndarray:
     return np.concatenate([target.translation - placement.translation, turn])
 
 
-def clip_norm(vector: np.ndarray, longest: float) -> np.ndarray:
-    """`vector`, scaled down where its length exceeds `longest`."""
-    length = float(np.linalg.norm(vector))
-    return vector if length <= longest else vector * (longest / length)
-
-
 def scale_to_speed_limit(rates: np.ndarray, fastest: float) -> np.ndarray:
     """q' (n,), all of it scaled down by one factor where a joint exceeds `fastest`: the
     direction of the motion stays."""

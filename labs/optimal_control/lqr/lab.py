@@ -6,14 +6,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from labs.arrays import with_row
+from labs.arrays import clip_norm, with_row
 from labs.lab import Action, Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.models.plant import Force
 from labs.optimal_control.lqr.comparison import COMPARED_HORIZONS, HORIZON_COUNT, compare
 from labs.optimal_control.lqr.linear_systems import SIMULATION_STEP, LinearSystem
 from labs.optimal_control.lqr.own_system import OwnSystem, step_own_system
 from labs.optimal_control.lqr.params import LqrParams
-from labs.optimal_control.lqr.picture import clip_norm, draw_regulated, draw_state_components
+from labs.optimal_control.lqr.picture import draw_regulated, draw_state_components
 from labs.optimal_control.lqr.plots import (
     PLOTS,
     closed_loop_fields,

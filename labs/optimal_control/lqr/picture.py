@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from labs.arrays import clip_norm
 from labs.optimal_control.lqr.linear_systems import LinearSystem
 from labs.optimal_control.lqr.own_system import OwnSystem
 from labs.optimal_control.lqr.params import LqrParams
@@ -50,12 +51,6 @@ def draw_state_components(scene: Scene, system: OwnSystem, x: np.ndarray) -> Non
         scene.sphere(f"rest {i + 1}", (0.0, 0.0, height), 0.02, "muted")
         scene.sphere(f"state {i + 1}", (0.0, place, height), 0.045)
         scene.label(f"name {i + 1}", f"x{i + 1} = {x[i]:.3g}", (0.0, place, height + 0.07))
-
-
-def clip_norm(vector: np.ndarray, longest: float) -> np.ndarray:
-    """The vector, shortened to this length where it is longer."""
-    length = float(np.linalg.norm(vector))
-    return vector if length <= longest else vector * (longest / length)
 
 
 def _force_arrow(force: np.ndarray) -> np.ndarray:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from labs.algorithms.inverse_kinematics import clip_norm
 from labs.algorithms.jacobian import PosedChain
+from labs.arrays import clip_norm
 from labs.scene import Scene
 
 CAMERA = ((0.92, 1.0, 0.87), (0.36, 0.08, 0.4))

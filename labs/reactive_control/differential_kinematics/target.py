@@ -3,8 +3,9 @@
 import numpy as np
 import pinocchio as pin
 
-from labs.algorithms.inverse_kinematics import clip_norm, nearest_distance, pose_error
+from labs.algorithms.inverse_kinematics import nearest_distance, pose_error
 from labs.algorithms.jacobian import PosedChain
+from labs.arrays import clip_norm
 from labs.reactive_control.differential_kinematics.params import DifferentialParams
 
 MAX_CORRECTION, MAX_CORRECTION_TURN = 0.5, 1.0

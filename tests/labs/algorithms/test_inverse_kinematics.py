@@ -8,7 +8,6 @@ from scipy.optimize import lsq_linear
 from labs.algorithms.inverse_kinematics import (
     INVERSE_KINEMATICS_METHODS,
     REACH_TOLERANCE,
-    clip_norm,
     damped_least_squares,
     jacobian_transpose,
     joint_rates,
@@ -19,6 +18,7 @@ from labs.algorithms.inverse_kinematics import (
     scale_to_speed_limit,
 )
 from labs.algorithms.jacobian import ForwardKinematics, geometric_jacobian
+from labs.arrays import clip_norm
 from labs.models.arms import load_arm
 
 RNG = np.random.default_rng(11)

@@ -15,7 +15,7 @@ from labs.scene import Color, Scene
 from labs.shapes import Vector3, translation
 from labs.tasks.direct.history import shift_in_time
 from labs.tasks.direct.picture import draw_goal, join_pieces
-from labs.tasks.direct.systems import rest_to_rest_task
+from labs.tasks.direct.systems import CAMERAS, rest_to_rest_task
 from labs.tasks.motion.playback import SUBSTEP
 
 COLORS: Mapping[str, Color] = {
@@ -46,7 +46,7 @@ LAYOUTS: Mapping[str, RowLayout] = {
     "pendulum": RowLayout(((1.3, 0.75, 1.2), (-0.4, 0.0, 0.72)), 0.4, (0.0, 0.0, 0.12)),
     "double-pendulum": RowLayout(((2.2, 1.1, 2.0), (-0.5, 0.0, 1.15)), 0.6, (0.0, 0.0, 0.1)),
     "cart-pole": RowLayout(((2.2, 0.6, 2.0), (-0.45, 0.0, 0.6)), 0.6, (0.0, -1.0, 0.72)),
-    "ur5": RowLayout(rest_to_rest_task("ur5").camera, 0.0, (0.0, 0.0, 0.07)),
+    "ur5": RowLayout(CAMERAS["ur5"], 0.0, (0.0, 0.0, 0.07)),
 }
 
 

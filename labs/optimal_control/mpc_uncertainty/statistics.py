@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import binom
+from scipy.special import bdtr
 
 from labs.optimal_control.mpc_uncertainty.controllers import NOMINAL, Controllers
 from labs.optimal_control.mpc_uncertainty.params import UncertaintyParams
@@ -53,7 +53,8 @@ def run_statistics(params: UncertaintyParams, chosen: Controllers, runs: Disturb
 
 def confidence_interval(params: UncertaintyParams) -> tuple[float, float]:
     """Between which shares of the runs a count lies in 95 of 100 cases, if each is beyond with
-    the probability promised."""
+    the probability promised: its quantiles (1 -+ CONFIDENCE) / 2, of a binomial distribution."""
     runs, risk = round(params.count), 1.0 - params.probability / 100.0
-    low, high = binom.interval(CONFIDENCE, runs, risk)
+    at_most = bdtr(np.arange(runs + 1.0), runs, risk)
+    low, high = np.searchsorted(at_most, [0.5 - 0.5 * CONFIDENCE, 0.5 + 0.5 * CONFIDENCE])
     return float(low) / runs, float(high) / runs

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from labs.algorithms.linear_mpc import LinearPlanner, OptimalValues
 from labs.algorithms.tube_mpc import TubePlanner, TubeValues
@@ -19,6 +20,7 @@ from labs.optimal_control.mpc_uncertainty.lab import REST_TICKS, TICKS_PER_STEP,
 from labs.optimal_control.mpc_uncertainty.params import DISTURBANCE_KINDS, UncertaintyParams
 from labs.optimal_control.mpc_uncertainty.picture import UNIT_CIRCLE, phase_plane
 from labs.optimal_control.mpc_uncertainty.runs import RUN_STEPS
+from labs.optimal_control.mpc_uncertainty.statistics import CONFIDENCE, confidence_interval
 from labs.problems.polyhedron import box
 from labs.resumable import Resumable, run_to_completion
 from labs.scene import NullScene
@@ -137,3 +139,11 @@ def test_each_controller_is_shown_alone_or_beside_the_others() -> None:
     near = NullScene()
     world.lab.draw(near, world.params, world.state)
     assert "start" not in near.names
+
+
+def test_the_confidence_interval_is_that_of_the_binomial_distribution() -> None:
+    for count in (20.0, 110.0, 400.0):
+        for probability in (50.0, 63.0, 90.0, 99.0, 99.9):
+            params = UncertaintyParams(count=count, probability=probability)
+            exact = binom.interval(CONFIDENCE, round(count), 1.0 - probability / 100.0)
+            assert confidence_interval(params) == tuple(float(k) / count for k in exact)

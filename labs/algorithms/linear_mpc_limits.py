@@ -104,11 +104,13 @@ class ProblemTerms(NamedTuple):
         )
 
     def cost(self, problem: LinearMpcProblem, X: np.ndarray, U: np.ndarray) -> float:
-        """V_N of X (N + 1, n) and U (N, m)."""
+        """V_N of X (N + 1, n) and U (N, m); infinite where squares overflow, as of what a solver
+        that failed left behind."""
         dx, du = X - self.x_ref, U - self.u_ref
-        stages = dx[:-1] @ problem.Q * dx[:-1]
-        squares = stages.sum() + (du @ problem.R * du).sum() + dx[-1] @ problem.Q_f @ dx[-1]
-        return float(0.5 * squares + (X[:-1] @ self.q).sum() + (U @ self.r).sum())
+        with np.errstate(over="ignore"):
+            stages = dx[:-1] @ problem.Q * dx[:-1]
+            squares = stages.sum() + (du @ problem.R * du).sum() + dx[-1] @ problem.Q_f @ dx[-1]
+            return float(0.5 * squares + (X[:-1] @ self.q).sum() + (U @ self.r).sum())
 
     def excess(
         self, problem: LinearMpcProblem, X: np.ndarray, U: np.ndarray

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from labs.algorithms.linear_mpc import LinearPlan, LinearPlanner
-from labs.algorithms.linear_mpc_limits import TwoSidedLimits
+from labs.algorithms.linear_mpc_limits import ProblemTerms, TwoSidedLimits
 from labs.algorithms.terminal_cost import cost_of_gain
 from labs.errors import LabError
 from labs.problems.linear_mpc import LinearMpcProblem
@@ -329,6 +329,13 @@ def test_the_cost_of_a_gain_is_its_sum() -> None:
     np.testing.assert_allclose(cost_of_gain(A, B, Q, R, slow), total, rtol=1e-9)
     with pytest.raises(LabError, match="magnitude 1"):
         cost_of_gain(A, B, Q, R, np.zeros((1, 2)))
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_cost_that_overflows_is_infinite() -> None:
+    problem = DOUBLE_INTEGRATOR
+    X, U = np.full((problem.N + 1, 2), 1e200), np.zeros((problem.N, 1))
+    assert ProblemTerms.of(problem, problem.N).cost(problem, X, U) == np.inf
 
 
 def test_a_guess_of_other_limits_is_left_aside() -> None:

@@ -237,7 +237,7 @@ def check_measure(params: JointParams, state: JointState, first: JointState) -> 
 
 
 @pytest.mark.parametrize("robot", ["ur5", "panda", "double-pendulum"])
-@pytest.mark.parametrize("changes", ends())
+@pytest.mark.parametrize("changes", list(ends()))
 def test_both_ends_of_every_slider(changes: Mapping[str, Value], robot: str) -> None:
     params = parameters({"robot": robot, **changes})
     path = list(states(params, 1.0, {50: PUSHED}))

@@ -62,14 +62,14 @@ def convexify(
         H, gauss_newton, square, diags_array(np.ones(n)).tocsc()
     )
 
-    def raised(theta: float, rho: float, delta: float = 0.0) -> np.ndarray:
+    def combined_hessian(theta: float, rho: float, delta: float = 0.0) -> np.ndarray:
         return np.asarray(theta * h + (1.0 - theta) * g + rho * s + delta * identity)
 
     def is_convex(data: np.ndarray) -> bool:
         return one.is_positive_definite(data, margin)
 
     def convex_at(theta: float) -> bool:
-        return is_convex(raised(theta, RHO_LIMIT * unit))
+        return is_convex(combined_hessian(theta, RHO_LIMIT * unit))
 
     theta = most
     if not convex_at(most):
@@ -81,16 +81,16 @@ def convexify(
         else:
             delta = max(delta / DELTA_FACTOR, MIN_DELTA * size)
             while delta <= DELTA_LIMIT * size:
-                data = raised(0.0, unit, delta)
+                data = combined_hessian(0.0, unit, delta)
                 if is_convex(data):
                     return ConvexModel(one.matrix(data), 0.0, unit, delta)
                 delta *= DELTA_FACTOR
             return None
         theta = SAFETY * low
     rho = unit
-    while rho < RHO_LIMIT * unit and not is_convex(raised(theta, rho)):
+    while rho < RHO_LIMIT * unit and not is_convex(combined_hessian(theta, rho)):
         rho *= RHO_FACTOR
-    return ConvexModel(one.matrix(raised(theta, rho)), theta, rho)
+    return ConvexModel(one.matrix(combined_hessian(theta, rho)), theta, rho)
 
 
 def is_positive_definite(P: csc_array, margin: float) -> bool:

@@ -94,7 +94,7 @@ def filter_line_search(
     small = 1e-4 * max(1.0, filter_.largest / MAX_VIOLATION_GROWTH)
     valued = False
 
-    def judged(
+    def accept_trial(
         y_new: np.ndarray, new: ProgramValues, alpha: float, again: bool
     ) -> AcceptedPoint | None:
         theta_new = violation(new)
@@ -117,7 +117,7 @@ def filter_line_search(
         if not np.isfinite(new.f):
             continue
         valued = True
-        trial = judged(y_new, new, alpha, False)
+        trial = accept_trial(y_new, new, alpha, False)
         if trial:
             return LineSearchResult(trial)
         if k == 0 and violation(new) >= theta:
@@ -131,7 +131,7 @@ def filter_line_search(
                 yield
                 if not np.isfinite(at.f):
                     break
-                trial = judged(y_new, at, 1.0, True)
+                trial = accept_trial(y_new, at, 1.0, True)
                 if trial:
                     return LineSearchResult(trial)
                 if violation(at) > 0.99 * least:

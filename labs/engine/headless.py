@@ -42,22 +42,22 @@ def run_headless(
     world = World(entry, changes, seed or 0, steps + 1, solution)
     iterations_given = any(event.name == "iterate" for event in todo if event.kind == "solve")
 
-    def heard() -> None:
+    def report_progress() -> None:
         if progress:
             progress(world.steps / max(steps, 1))
 
     for step in range(steps + 1):
         while todo and todo[0].step <= step:
             if todo[0].name == "show" and not iterations_given:
-                _solve_to_end(world, heard)
+                _solve_to_end(world, report_progress)
             _apply_event(world, todo.pop(0))
         if not iterations_given:
-            _solve_to_end(world, heard)
+            _solve_to_end(world, report_progress)
         if step == steps or world.trouble:
             break
         world.advance()
         if step % 100 == 0:
-            heard()
+            report_progress()
     if todo:
         last = max(event.step for event in todo) * period
         if not world.trouble:
@@ -65,11 +65,12 @@ def run_headless(
     return world
 
 
-def _solve_to_end(world: World, heard: Callable[[], None]) -> None:
-    """To the end, unless a loaded solution was there already; `heard` after every iteration."""
+def _solve_to_end(world: World, report_progress: Callable[[], None]) -> None:
+    """To the end, unless a loaded solution was there already; `report_progress` after every
+    iteration."""
     while world.solving and not (world.latest and world.latest.done):
         world.iterate()
-        heard()
+        report_progress()
 
 
 def _override_params(

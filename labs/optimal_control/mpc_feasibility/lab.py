@@ -244,12 +244,12 @@ class MpcFeasibility(Lab[MpcFeasibilityParams, MpcFeasibilityState]):
 class NoPlanner:
     """Plans nothing, for a reason."""
 
-    def __init__(self, why: str) -> None:
-        self.why = why
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
 
     def plan(self, x: np.ndarray, guess: Plan | None, N: int | None = None) -> Resumable[Plan]:
         """What was not found."""
-        return Plan(x[None], np.zeros((0, 1)), np.nan, False, self.why)
+        return Plan(x[None], np.zeros((0, 1)), np.nan, False, self.reason)
         yield
 
 

@@ -64,7 +64,7 @@ def learn(params: PredictionParams, training: Training) -> Iterator[Snapshot]:
     for i, batch in enumerate(online.learn(params, sampled), 1):
         if i <= MAX_DEPTH:
             tree.deepen()
-            counts[0] += tree.looked
+            counts[0] += tree.transitions
         if change > TOLERANCE:
             swept, change, _ = policy_backup(mdp, swept, world.policy)
             counts[1] += (world.policy[~mdp.terminal] > 0.0).sum()
@@ -89,7 +89,7 @@ class ExhaustiveSearch:
         self._chances = np.ones((mdp.X, 1))
         self.values = np.zeros(mdp.X)
         """(X,) expected cost of the steps so far."""
-        self.looked = 0.0
+        self.transitions = 0.0
         """Transitions of the last level."""
         self._discount = 1.0
 
@@ -99,7 +99,7 @@ class ExhaustiveSearch:
         alive = ~mdp.terminal[ends] & (self._chances > 0.0)
         chances = (self._chances * alive)[..., None] * self._policy[ends]
         self.values = self.values + self._discount * (chances * mdp.C[ends]).sum(axis=(1, 2))
-        self.looked = float((chances > 0.0).sum())
+        self.transitions = float((chances > 0.0).sum())
         self._ends = mdp.successors[ends].reshape(mdp.X, -1)
         self._chances = chances.reshape(mdp.X, -1)
         self._discount *= mdp.gamma

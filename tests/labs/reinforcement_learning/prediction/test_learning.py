@@ -113,9 +113,9 @@ def test_exhaustive_search_gives_the_values_of_dynamic_programming_at_another_pr
         walk_prediction(FIVE_STATE_WALK, 1.0).mdp, walk_prediction(FIVE_STATE_WALK, 1.0).policy
     )
     tree.deepen()
-    assert tree.looked == 10.0
+    assert tree.transitions == 10.0
     tree.deepen()
-    assert tree.looked == 16.0  # two of the ten ended
+    assert tree.transitions == 16.0  # two of the ten ended
 
 
 def test_the_pendulum_s_end_costs_nothing() -> None:

@@ -129,6 +129,10 @@ class Mechanism:
         """Position of the tip (3,) [m]."""
         return self.plant.tip(q)
 
+    def tip_positions(self, X: np.ndarray) -> np.ndarray:
+        """Positions of the tip (k, 3) [m] at the states X (k, nx)."""
+        return np.array([self.tip(x[: self.nq]) for x in X]).reshape(-1, 3)
+
     def tip_jacobian(self, q: np.ndarray) -> np.ndarray:
         """J(q), (3, nv): velocity of the tip in the world's axes is J(q) q'."""
         return self.plant.tip_jacobian(q)

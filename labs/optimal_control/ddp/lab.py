@@ -26,7 +26,7 @@ from labs.optimal_control.ddp.plots import (
 from labs.params import Value
 from labs.problems.optimal_control import OptimalControlProblem
 from labs.scene import Scene
-from labs.tasks.motion.motions import clip_controls, initial_controls, resample_controls, tip_path
+from labs.tasks.motion.motions import clip_controls, initial_controls, resample_controls
 from labs.tasks.motion.playback import (
     FEEDBACK,
     OPEN_LOOP,
@@ -184,10 +184,8 @@ class Ddp(Lab[DdpParams, DdpState]):
         """What each run paid, at the present weights, and where it came to."""
         cost = params.problem(state.plan.N, state.plan.h).cost
         runs = zip(state.playback.X, state.playback.U, strict=True)
-        ends, goal = (
-            tip_path(mechanism(params.system), state.playback.X[:, -1]),
-            _goal_position(params),
-        )
+        ends = mechanism(params.system).tip_positions(state.playback.X[:, -1])
+        goal = _goal_position(params)
         return replace(
             state,
             run_costs=np.array([cost.value(X, U) for X, U in runs]),
@@ -264,7 +262,7 @@ def _paths(params: DdpParams, at: DdpIterate) -> tuple[np.ndarray, np.ndarray]:
     """Of the tip (PATH_POINTS, 3), and of the joint shown (PATH_POINTS, 2)."""
     system, joint = mechanism(params.system), params.motion.shown_joint
     X = subsample(at.X)
-    return tip_path(system, X), X[:, [joint, system.nq + joint]]
+    return system.tip_positions(X), X[:, [joint, system.nq + joint]]
 
 
 def _feedback_states(state: DdpState) -> np.ndarray:

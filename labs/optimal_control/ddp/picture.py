@@ -6,7 +6,6 @@ from labs.models.mechanisms import mechanism
 from labs.optimal_control.ddp.history import KEPT_PATHS, DdpHistory, subsample
 from labs.optimal_control.ddp.params import DdpParams
 from labs.scene import Scene
-from labs.tasks.motion.motions import tip_path
 from labs.tasks.motion.playback import FEEDBACK, OPEN_LOOP
 
 PATH_SPACING = np.array([0.06, 0.0, 0.0])
@@ -42,15 +41,14 @@ def draw_paths(
             scene.trail(f"before {age}", paths[i] - age * spacing, "muted", (i + 1) / KEPT_PATHS)
     scene.trail("plan", paths[-1], "warning" if failed else "reference")
     if len(played) > 1:
-        scene.trail("played", tip_path(mechanism(params.system), subsample(played)))
+        scene.trail("played", mechanism(params.system).tip_positions(subsample(played)))
 
 
 def draw_goal(
     scene: Scene, params: DdpParams, x: np.ndarray, goal: np.ndarray, pushed: bool
 ) -> None:
     """Where the tip should end (3,) [m], a push on both tips, and the name of the ghost."""
-    system = mechanism(params.system)
-    ends = tip_path(system, x)
+    ends = mechanism(params.system).tip_positions(x)
     if np.linalg.norm(ends[FEEDBACK] - ends[OPEN_LOOP]) > LABEL_DISTANCE:
         scene.label("of open loop", "open loop", ends[OPEN_LOOP])
     if pushed:

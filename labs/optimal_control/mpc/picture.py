@@ -6,7 +6,6 @@ import pinocchio as pin
 from labs.optimal_control.mpc.history import KEPT_PREDICTIONS, PlanningHistory
 from labs.optimal_control.mpc.params import MpcParams
 from labs.scene import Scene
-from labs.tasks.motion.motions import tip_path
 
 SPACING = 0.02
 """[m] by which an earlier prediction of a motion in a plane stands behind the next."""
@@ -39,11 +38,11 @@ def draw_predictions(scene: Scene, params: MpcParams, history: PlanningHistory) 
     at = params.robot
     planar = params.system != "ur5"
     if len(history.past) > 1:
-        scene.trail("past", tip_path(at.mechanism, history.past[::2]))
+        scene.trail("past", at.mechanism.tip_positions(history.past[::2]))
     for i, old in enumerate(history.predictions):
         age = len(history.predictions) - i
         behind = np.array([-SPACING * age * planar, 0.0, 0.0])
-        path = tip_path(at.mechanism, old.X[::2]) + behind
+        path = at.mechanism.tip_positions(old.X[::2]) + behind
         if len(path) > 1:
             scene.trail(
                 f"before {age}",
@@ -54,7 +53,7 @@ def draw_predictions(scene: Scene, params: MpcParams, history: PlanningHistory) 
     now = history.latest
     if now is None:
         return
-    path = tip_path(at.mechanism, now.X)
+    path = at.mechanism.tip_positions(now.X)
     scene.trail("prediction", path, "reference")
     scene.sphere("end of the horizon", path[-1], 0.012, "reference")
     if np.linalg.norm(path[-1] - at.mechanism.tip(history.past[-1, : at.n])) > GHOST_DISTANCE:

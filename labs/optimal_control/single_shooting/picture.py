@@ -57,7 +57,7 @@ def draw_robots(scene: Scene, params: SingleShootingParams, plan: ShootingPlan, 
     ghost = interpolate_state(changed, plan.T, t)
     scene.arm("robot", arm, x[:n])
     scene.arm("ghost", arm, ghost[:n], ghost=True)
-    tips = [at.mechanism.tip(state[:n]) for state in (x, ghost)]
+    tips = at.mechanism.tip_positions(np.array([x, ghost]))
     if np.linalg.norm(tips[0] - tips[1]) > LABEL_DISTANCE:
         word = "planned" if params.delta == 0.0 else "changed"
         scene.label("of ghost", word, tips[1])
@@ -114,8 +114,8 @@ def dragged_control(
 def drawn_path(at: RestToRestTask, X: np.ndarray, T: float) -> np.ndarray:
     """(PATH_POINTS, 3) [m] of the tip along X (k + 1, nx) over T [s], as it is drawn."""
     t = np.linspace(0.0, T, PATH_POINTS)
-    tips = [at.mechanism.tip(interpolate_state(X, T, time)[: at.mechanism.nq]) for time in t]
-    return shift_in_time(at, np.array(tips), t)
+    tips = at.mechanism.tip_positions(np.array([interpolate_state(X, T, time) for time in t]))
+    return shift_in_time(at, tips, t)
 
 
 @lru_cache(maxsize=4)

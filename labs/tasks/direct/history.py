@@ -82,7 +82,7 @@ def _arcs(params: DirectParams, motion: PiecewiseTrajectory) -> tuple[np.ndarray
     """Of the tip (pieces, ARC_POINTS, 3) as drawn, and in the phase plane (..., 2)."""
     body, joint = params.task.mechanism, params.task.shown
     X = motion.arcs(ARC_POINTS)
-    tips = np.array([[body.tip(x[: body.nq]) for x in arc] for arc in X])
+    tips = np.array([body.tip_positions(arc) for arc in X])
     h = motion.T / motion.pieces
     times = motion.times[:-1, None] + np.linspace(0.0, h, ARC_POINTS)
     return shift_in_time(params.task, tips, times), X[:, :, [joint, body.nq + joint]]

@@ -34,7 +34,7 @@ def draw_robots(scene: Scene, params: DirectParams, state: DirectState) -> None:
         effort = at.mechanism.S @ (np.abs(playback.u[FEEDBACK]) / params.bound)
     scene.arm("robot", arm, playback.x[FEEDBACK, :n], effort=effort)
     scene.arm("open loop", arm, playback.x[OPEN_LOOP, :n], ghost=True)
-    tips = [at.mechanism.tip(x[:n]) for x in playback.x]
+    tips = at.mechanism.tip_positions(playback.x)
     if np.linalg.norm(tips[FEEDBACK] - tips[OPEN_LOOP]) > LABEL_DISTANCE:
         scene.label("of open loop", "open loop", tips[OPEN_LOOP])
 
@@ -89,7 +89,7 @@ def _draw_velocity_gaps(scene: Scene, params: DirectParams, state: DirectState) 
     X = motion.X[1:]
     jumps = np.array([body.tip_jacobian(x[:n]) @ gap for x, gap in zip(X, gaps, strict=True)])
     large = np.linalg.norm(jumps, axis=1) > MIN_VELOCITY_GAP
-    tips = np.array([body.tip(x[:n]) for x in X[large]]).reshape(-1, 3)
+    tips = body.tip_positions(X[large])
     starts = shift_in_time(params.task, tips, motion.times[1:][large])
     scene.arrows("velocity gaps", starts, starts + ARROW_SCALE * jumps[large])
 

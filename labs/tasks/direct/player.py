@@ -64,7 +64,7 @@ def advance_player(params: DirectParams, state: S) -> S:
     state = replace(state, playback=playback)
     if not playback.finished(state.plan):
         return state
-    ends = [plant.tip(x[: plant.nq]) for x in playback.x]
+    ends = plant.tip_positions(playback.x)
     missed = [float(np.linalg.norm(end - params.goal_position)) for end in ends]
     return replace(state, goal_errors=np.array(missed))
 

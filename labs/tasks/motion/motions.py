@@ -18,7 +18,7 @@ import numpy as np
 
 from labs.errors import LabError
 from labs.models.discrete import DiscreteMechanism
-from labs.models.mechanisms import Mechanism, mechanism
+from labs.models.mechanisms import mechanism
 from labs.problems.optimal_control import OptimalControlProblem
 from labs.shapes import Vector3
 from labs.tasks.motion.cost import MotionCost, TipCost
@@ -128,8 +128,3 @@ def resample_controls(U: np.ndarray, h: float, new_h: float, N: int) -> np.ndarr
 def clip_controls(problem: OptimalControlProblem, U: np.ndarray) -> np.ndarray:
     """U (N, nu) cut to the bound of the problem."""
     return U if problem.bound is None else np.clip(U, -problem.bound, problem.bound)
-
-
-def tip_path(system: Mechanism, X: np.ndarray) -> np.ndarray:
-    """Where the tip is (k, 3) [m] along X (k, nx)."""
-    return np.array([system.tip(x[: system.nq]) for x in X])

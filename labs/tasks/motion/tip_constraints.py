@@ -34,7 +34,7 @@ class ObstacleConstraint:
 
     def values(self, X: np.ndarray) -> np.ndarray:
         """(k, size) [m]"""
-        places = tip_positions(self.mechanism, X)
+        places = self.mechanism.tip_positions(X)
         gaps = [
             (ball.radius**2 - ((places - ball.center) ** 2).sum(axis=1)) / (2.0 * ball.radius)
             for ball in self.balls
@@ -43,7 +43,7 @@ class ObstacleConstraint:
 
     def jacobians(self, X: np.ndarray) -> np.ndarray:
         """(k, size, nx)"""
-        places, J = tip_positions(self.mechanism, X), tip_jacobians(self.mechanism, X)
+        places, J = self.mechanism.tip_positions(X), tip_jacobians(self.mechanism, X)
         rows = [
             -np.einsum("ki,kij->kj", places - ball.center, J) / ball.radius for ball in self.balls
         ]
@@ -68,7 +68,7 @@ class TipTargetConstraint:
 
     def values(self, X: np.ndarray) -> np.ndarray:
         """(k, 3) [m]"""
-        return np.asarray(tip_positions(self.mechanism, X) - self.target)
+        return np.asarray(self.mechanism.tip_positions(X) - self.target)
 
     def jacobians(self, X: np.ndarray) -> np.ndarray:
         """(k, 3, nx)"""
@@ -77,11 +77,6 @@ class TipTargetConstraint:
     def name(self, i: int) -> str:
         """What e_i says."""
         return f"the tip's distance from its target along {'xyz'[i]}"
-
-
-def tip_positions(mechanism: Mechanism, X: np.ndarray) -> np.ndarray:
-    """p (k, 3) [m] at the states X (k, nx)."""
-    return np.array([mechanism.tip(x[: mechanism.nq]) for x in X])
 
 
 def tip_jacobians(mechanism: Mechanism, X: np.ndarray) -> np.ndarray:

@@ -113,6 +113,11 @@ def test_the_tips_jacobian_is_that_of_finite_differences(name: str) -> None:
     np.testing.assert_allclose(mech.tip_jacobian(q) @ v, moved, atol=1e-8)
 
 
+def test_tips_follow_a_trajectory() -> None:
+    path = mechanism("pendulum").tip_positions(np.array([[0.0, 9.0], [np.pi, 9.0]]))
+    np.testing.assert_allclose(path, [[0.0, 0.0, 0.25], [0.0, 0.0, 1.25]], atol=1e-12)
+
+
 def test_what_cannot_be_is_said() -> None:
     with pytest.raises(LabError, match=r"acrobot cannot rest .* joint 1, which has no motor"):
         mechanism("acrobot").equilibrium_control(np.array([0.5, 0.0]))

@@ -12,7 +12,6 @@ from labs.tasks.motion.motions import (
     initial_controls,
     motion_problem,
     resample_controls,
-    tip_path,
 )
 
 WEIGHTS = MotionWeights(goal=7.0, rest=5.0, posture=3.0, velocity=2.0, control=0.5)
@@ -76,12 +75,6 @@ def test_controls_fit_another_step_and_horizon() -> None:
         resample_controls(U, 0.02, 0.01, 10)[:, 0], [0, 0, 1, 1, 2, 2, 3, 3, 3, 3]
     )
     np.testing.assert_array_equal(resample_controls(U, 0.01, 0.02, 3)[:, 0], [1, 3, 3])
-
-
-def test_tips_follow_a_trajectory() -> None:
-    moved = mechanism("pendulum")
-    path = tip_path(moved, np.array([[0.0, 9.0], [np.pi, 9.0]]))
-    np.testing.assert_allclose(path, [[0.0, 0.0, 0.25], [0.0, 0.0, 1.25]], atol=1e-12)
 
 
 def test_wrong_use_is_said() -> None:

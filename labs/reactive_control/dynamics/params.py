@@ -7,8 +7,14 @@ import numpy as np
 
 from labs.algorithms.integrators import INTEGRATORS
 from labs.params import Group, Params
-from labs.tasks.arm.params import joint_values, offset_knob, robot_choice, where_joint_exists
-from labs.tasks.arm.postures import POSED_ARMS, POSTURES, posture
+from labs.tasks.arm.params import (
+    joint_values,
+    offset_knob,
+    offset_posture,
+    robot_choice,
+    where_joint_exists,
+)
+from labs.tasks.arm.postures import POSED_ARMS, POSTURES
 
 DRIVES = {
     "balanced": "Gravity balanced",
@@ -121,9 +127,7 @@ class DynamicsParams(Params):
     @property
     def start(self) -> np.ndarray:
         """q(0), (nq,) [rad]."""
-        base = posture(self.robot, self.posture)
-        q: np.ndarray = base + joint_values(self, "q", len(base))
-        return q
+        return offset_posture(self, self.robot, self.posture)
 
     def torques(self, n: int) -> np.ndarray:
         """Of the sliders (n,) [N m]."""

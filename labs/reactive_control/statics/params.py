@@ -6,8 +6,14 @@ import numpy as np
 
 from labs.models.arms import load_arm
 from labs.params import Group, Params
-from labs.tasks.arm.params import joint_values, offset_knob, robot_choice, where_joint_exists
-from labs.tasks.arm.postures import POSED_ARMS, POSTURES, posture
+from labs.tasks.arm.params import (
+    joint_values,
+    offset_knob,
+    offset_posture,
+    robot_choice,
+    where_joint_exists,
+)
+from labs.tasks.arm.postures import POSED_ARMS, POSTURES
 
 POSTURE = Group("Posture")
 WRENCH = Group("Wrench at the end-effector")
@@ -86,9 +92,7 @@ class StaticsParams(Params):
     @property
     def q(self) -> np.ndarray:
         """(nq,) [rad]: the posture, each joint turned by its slider."""
-        base = posture(self.robot, self.posture)
-        q: np.ndarray = base + joint_values(self, "q", len(base))
-        return q
+        return offset_posture(self, self.robot, self.posture)
 
     @property
     def dq(self) -> np.ndarray:

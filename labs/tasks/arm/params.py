@@ -7,7 +7,7 @@ import numpy as np
 
 from labs.models.arms import ARM_TITLES, JOINT_COUNTS
 from labs.params import Group, Params
-from labs.tasks.arm.postures import POSED_ARMS
+from labs.tasks.arm.postures import POSED_ARMS, posture
 from labs.tunables import ChoiceCondition, TunableOptions
 
 MAX_JOINTS = 7
@@ -43,3 +43,11 @@ def offset_knob(group: Group, joint: int) -> Any:
 def joint_values(params: Params, prefix: str, joints: int) -> np.ndarray:
     """(joints,) the values of the knobs `prefix`1, `prefix`2, ..."""
     return np.array([getattr(params, f"{prefix}{i}") for i in range(1, joints + 1)])
+
+
+def offset_posture(params: Params, robot: str, name: str) -> np.ndarray:
+    """q (nq,) [rad]: the robot's posture of this name, each joint turned by its `offset_knob`, the
+    fields q1, q2, ... of `params`."""
+    base = posture(robot, name)
+    q: np.ndarray = base + joint_values(params, "q", len(base))
+    return q

@@ -6,8 +6,6 @@ from labs.tasks.direct.params import WORLD, DirectParams
 from labs.tasks.direct.plan_params import LIGHT_SYSTEMS
 
 MAX_PIECES, MAX_STEPS = 40, 4
-MAX_HEAVY_PIECES = 12
-"""Of the UR5, whose derivatives cost more."""
 VIEWS = {"plans": "The three plans", "played": "One plan, played"}
 
 TRANSCRIPTION = Group("Transcription", effect="solve")
@@ -36,8 +34,7 @@ class DirectMethodsParams(DirectParams):
 
     @property
     def N(self) -> int:
-        N = round(self.pieces)
-        return N if self.system in LIGHT_SYSTEMS else min(N, MAX_HEAVY_PIECES)
+        return self.cap_pieces(self.pieces)
 
     @property
     def m(self) -> int:
@@ -46,4 +43,4 @@ class DirectMethodsParams(DirectParams):
 
     @property
     def M(self) -> int:
-        return round(self.steps) if self.system in LIGHT_SYSTEMS else 1
+        return self.cap_steps(self.steps)

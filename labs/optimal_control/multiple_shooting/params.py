@@ -48,11 +48,11 @@ class MultipleShootingParams(DirectParams):
 
     @property
     def M(self) -> int:
-        return round(self.steps) if self.system in LIGHT_SYSTEMS else 1
+        return self.cap_steps(self.steps)
 
     @property
     def compares(self) -> bool:
-        return self.study == "segments" and self.system in LIGHT_SYSTEMS
+        return self.study == "segments" and not self.costly_derivatives
 
     def shooting(self, m: int) -> MultipleShooting:
         """The programme with m segments."""

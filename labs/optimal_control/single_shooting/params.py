@@ -10,8 +10,6 @@ from labs.params import Group
 from labs.tasks.direct.plan_params import LIGHT_SYSTEMS, SOLVER, PlanParams
 
 MAX_PIECES, MAX_STEPS = 60, 8
-MAX_HEAVY_PIECES = 12
-"""Of the UR5, whose derivatives cost more."""
 
 CHOICE_SETTINGS: ChoiceSettings = {
     "system": {
@@ -91,17 +89,16 @@ class SingleShootingParams(PlanParams):
 
     @property
     def N(self) -> int:
-        N = round(self.pieces)
-        return N if self.system in LIGHT_SYSTEMS else min(N, MAX_HEAVY_PIECES)
+        return self.cap_pieces(self.pieces)
 
     @property
     def M(self) -> int:
-        return round(self.steps) if self.system in LIGHT_SYSTEMS else 1
+        return self.cap_steps(self.steps)
 
     @property
     def studied(self) -> str:
         """What is measured besides."""
-        return self.study if self.system in LIGHT_SYSTEMS else "none"
+        return "none" if self.costly_derivatives else self.study
 
     @property
     def chosen_piece(self) -> int:

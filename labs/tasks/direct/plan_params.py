@@ -24,6 +24,8 @@ T_LIMITS = (0.2, 6.0)
 """[s] of a free horizon."""
 LIGHT_SYSTEMS = tuple(name for name in TASK_TITLES if name != "ur5")
 """Systems whose derivatives cost little."""
+MAX_HEAVY_PIECES = 12
+"""Of the UR5, whose derivatives cost more, in shooting."""
 NEEDS_LIMIT = ("least-time", "fastest-end")
 """Objectives that have no minimum without a limit of the control."""
 MAY_LIMIT = {"objective": tuple(name for name in OBJECTIVES if name not in NEEDS_LIMIT)}
@@ -132,6 +134,11 @@ class PlanParams(Params):
         return rest_to_rest_task(self.system)
 
     @property
+    def costly_derivatives(self) -> bool:
+        """Whether those of the dynamics cost much, as the UR5's."""
+        return self.system not in LIGHT_SYSTEMS
+
+    @property
     def target(self) -> np.ndarray:
         """p* (3,) [m] of a reach."""
         return np.array([self.target_x, self.target_y, self.target_z])
@@ -190,6 +197,14 @@ class PlanParams(Params):
             T_limits=T_LIMITS if self.objective == "least-time" else None,
         )
         return replace(motion, x0=self.task.x0)
+
+    def cap_pieces(self, pieces: float) -> int:
+        """N of as many pieces as asked for; of the UR5 at most MAX_HEAVY_PIECES."""
+        return min(round(pieces), MAX_HEAVY_PIECES) if self.costly_derivatives else round(pieces)
+
+    def cap_steps(self, steps: float) -> int:
+        """M, the steps of integration in a piece; of the UR5 one."""
+        return 1 if self.costly_derivatives else round(steps)
 
     @property
     def options(self) -> SqpOptions:

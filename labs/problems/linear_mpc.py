@@ -99,6 +99,11 @@ class LinearMpcProblem:
     def m(self) -> int:
         return int(np.shape(self.B)[-1])
 
+    def step(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """A x + B u + c (n,), the state after x (n,) under u (m,)."""
+        after: np.ndarray = self.A @ x + self.B @ u
+        return after if self.c is None else after + self.c
+
 
 def check_holds(holds: Sequence[int], N: int) -> None:
     """Raises LabError unless controls held over holds[0], holds[1], ... steps fill N steps."""

@@ -65,18 +65,14 @@ def _loop(
     planner, options = LinearPlanner(problem, form), MpcOptions()
     guess: Plan | None = None
     times, controls, active = [], [], []
-
-    def model(x: np.ndarray, u: np.ndarray) -> np.ndarray:
-        return np.asarray(problem.A @ x + problem.B @ u)
-
     for _ in range(PERIODS):
         plan = run_to_completion(planner.plan(x, guess if warm else None))
         assert plan.found, plan.message
         times.append(1e3 * plan.seconds["QP"])
         controls.append(plan.U[0])
         active.append(sum(int(rows.sum()) for rows in plan.active.values()))
-        x = model(x, plan.U[0])
-        guess = mpc.shift_plan(plan, 1, model, options)
+        x = problem.step(x, plan.U[0])
+        guess = mpc.shift_plan(plan, 1, problem.step, options)
     return float(np.mean(times[1:])), np.array(controls), active[0]
 
 

@@ -266,20 +266,13 @@ def _planner(setup: FeasibilitySettings, soft: bool) -> Planner:
 def _start_period(params: MpcFeasibilityParams, state: MpcFeasibilityState) -> MpcFeasibilityState:
     """A new period."""
     setup, soft = params.setup, params.fallback == "soft"
-    A, B = feasibility(setup).problem.A, feasibility(setup).problem.B
-    U = feasibility(setup).problem.control_set
+    problem = feasibility(setup).problem
+    A, B, U = problem.A, problem.B, problem.control_set
     options = mpc.MpcOptions(fallback="tail" if params.fallback == "tail" else "brake")
     # The control after which the velocity is zero, or as near to it as U allows.
     brake = np.clip(-(A[1] @ state.z) / B[1], -U.h[1], U.h[0])
     at = run_to_completion(
-        mpc.step(
-            _planner(setup, soft),
-            lambda z, w: A @ z + B @ w,
-            options,
-            state.controller,
-            state.z,
-            brake,
-        )
+        mpc.step(_planner(setup, soft), problem.step, options, state.controller, state.z, brake)
     )
     status, why = at.status, at.why
     if soft and not status and at.plan is not None and at.plan.violation > 0.0:

@@ -80,12 +80,8 @@ def applied_control(formulation: Formulation, run: ClosedLoopRun) -> np.ndarray:
 
 def _start_period(formulation: Formulation, run: ClosedLoopRun) -> ClosedLoopRun:
     """At the beginning of a period."""
-    k, problem = run.k + 1, formulation.problem
+    k, model = run.k + 1, formulation.problem.step
     error = run.x - formulation.reference.states(np.array(k))
-
-    def model(e: np.ndarray, u: np.ndarray) -> np.ndarray:
-        return np.asarray(problem.A @ e + problem.B @ u)
-
     planner, brake = formulation.planner_at(k), np.zeros(1)
     work = mpc.step(planner, model, OPTIONS, run.controller, error, brake)
     controller = run_to_completion(work)

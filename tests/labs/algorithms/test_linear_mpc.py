@@ -187,7 +187,7 @@ def merit(problem: LinearMpcProblem, x: np.ndarray, U: np.ndarray) -> float:
     for u in U:
         total += x @ problem.Q @ x / 2 + u @ problem.R @ u / 2
         total += 20.0 * np.maximum(problem.state_set.H @ x - problem.state_set.h, 0.0).sum()
-        x = problem.A @ x + problem.B @ u
+        x = problem.step(x, u)
     return float(total)
 
 

@@ -18,10 +18,6 @@ PROBLEM = with_riccati(DOUBLE_INTEGRATOR)
 REST = np.zeros(1)
 
 
-def model(x: np.ndarray, u: np.ndarray) -> np.ndarray:
-    return np.asarray(PROBLEM.A @ x + PROBLEM.B @ u)
-
-
 def close_loop(
     planner: Planner,
     options: MpcOptions,
@@ -33,11 +29,11 @@ def close_loop(
     """States, controls and controllers; in the `held` periods nothing is planned."""
     at, X, U, seen = init(options, REST), [np.array(x)], [], []
     for t in range(periods):
-        work = step(planner, model, options, at, X[-1], brake, t not in held)
+        work = step(planner, PROBLEM.step, options, at, X[-1], brake, t not in held)
         at = run_to_completion(work)
         seen.append(at)
         U.append(at.u)
-        X.append(model(X[-1], at.u))
+        X.append(PROBLEM.step(X[-1], at.u))
     return np.array(X), np.array(U), seen
 
 
@@ -73,15 +69,15 @@ def test_the_first_control_acts_and_the_rest_is_the_next_guess() -> None:
     assert np.isfinite(guess.cost)
     np.testing.assert_array_equal(guess.U[:-1], plan.U[1:])
     assert guess.U[-1] == 0.0
-    np.testing.assert_allclose(guess.X[-1], model(plan.X[-1], REST))
+    np.testing.assert_allclose(guess.X[-1], PROBLEM.step(plan.X[-1], REST))
     np.testing.assert_array_equal(guess.active["control"][:-1], plan.active["control"][1:])
     _, same, _ = close_loop(LinearPlanner(PROBLEM), MpcOptions(warm=False), [1.5, 0.2], 25)
     np.testing.assert_allclose(same, U, atol=1e-10)
     options = MpcOptions(last="repeated")
-    repeated = shift_plan(plan, 2, model, options)
+    repeated = shift_plan(plan, 2, PROBLEM.step, options)
     assert repeated is not None
     np.testing.assert_array_equal(repeated.U[-3:, 0], np.repeat(plan.U[-1], 3))
-    assert shift_plan(plan, len(plan.U), model, options) is None
+    assert shift_plan(plan, len(plan.U), PROBLEM.step, options) is None
     warm, cold = (
         sum(
             s.plan.iterations
@@ -117,7 +113,7 @@ def test_a_delay_that_is_compensated_only_shifts_the_run(delay: int) -> None:
     X, U, seen = close_loop(planner, MpcOptions(delay=delay), x.tolist(), 30)
     np.testing.assert_array_equal(U[:delay], 0.0)
     for _ in range(delay):
-        x = model(x, REST)
+        x = PROBLEM.step(x, REST)
     prompt, _, _ = close_loop(planner, MpcOptions(), x.tolist(), 30 - delay)
     np.testing.assert_allclose(X[delay:], prompt, atol=1e-9)
     assert seen[-1].committed.shape == (delay, 1)

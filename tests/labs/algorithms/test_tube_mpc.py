@@ -139,16 +139,11 @@ def test_receding_horizon_control_acts_by_the_tubes_gain() -> None:
     expected = run_to_completion(example.planner.values(x[None])).u[0]
     start = mpc.init(mpc.MpcOptions(), np.zeros(1))
     at = run_to_completion(
-        mpc.step(example.planner, _model, mpc.MpcOptions(), start, x, np.zeros(1))
+        mpc.step(example.planner, example.problem.step, mpc.MpcOptions(), start, x, np.zeros(1))
     )
     np.testing.assert_allclose(at.u, expected, atol=1e-12)
     plan = run_to_completion(example.planner.plan(x, None))
     assert abs(expected - plan.U[0]).max() > 1e-3, "the nominal state starts elsewhere"
-
-
-def _model(x: np.ndarray, u: np.ndarray) -> np.ndarray:
-    problem = published().problem
-    return np.asarray(problem.A @ x + problem.B @ u)
 
 
 def test_without_disturbance_it_is_nominal_mpc() -> None:

@@ -51,7 +51,7 @@ def test_the_surface_is_the_value_and_tells_what_becomes_of_it(
         assert now is not None
         assert pytest.approx(now[0], abs=1e-6) == V
         u = now[2][0]
-        after = by_quadprog(p, p.A @ x + p.B @ u)
+        after = by_quadprog(p, p.step(x, u))
         seen.add(int(change))
         if after is None:
             assert change == INFEASIBLE_NEXT

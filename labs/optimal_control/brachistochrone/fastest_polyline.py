@@ -75,6 +75,11 @@ class FastestPolyline:
         head = np.maximum(depth - self.mu * self.x[1:-1], 0.0)
         return np.clip(np.sqrt(2.0 * self.g * head), self.lower, self.upper)
 
+    @property
+    def straight_line_speeds(self) -> np.ndarray:
+        """(N - 1,) [m/s] down the straight line to B."""
+        return self.speeds(self.depth * self.x[1:-1] / self.x[-1])
+
     def values(self, y: np.ndarray) -> ProgramValues:
         none = np.zeros(0)
         if not (np.isfinite(y).all() and (y > 0.0).all()):

@@ -78,7 +78,7 @@ class Brachistochrone(Lab[BrachistochroneParams, BrachistochroneState]):
         """The beads are let go; the optimiser has a straight line."""
         problem = _problem(params, params.grids[0])
         return BrachistochroneState(
-            history=_initial_history(params, problem, _straight_line_speeds(problem))
+            history=_initial_history(params, problem, problem.straight_line_speeds)
         )
 
     # The solver's clock -----------------------------------------------------------------------
@@ -89,7 +89,7 @@ class Brachistochrone(Lab[BrachistochroneParams, BrachistochroneState]):
         """One iteration a snapshot, on one grid or on several in turn."""
         problem, count = _problem(params, params.grids[0]), 0
         cold = params.start == "cold"
-        v = _straight_line_speeds(problem) if cold else _speeds_along(problem, state.history.nodes)
+        v = problem.straight_line_speeds if cold else _speeds_along(problem, state.history.nodes)
         history = _initial_history(params, problem, v)
         if not params.in_reach:
             yield Snapshot(1, {"history": history}, _out_of_reach_message(params))
@@ -245,19 +245,14 @@ def _initial_history(
 
 def _initial_iterate(problem: FastestPolyline, v: np.ndarray) -> sqp.SqpIterate:
     """At these speeds. A gradient is small beside the straight line's, wherever one starts."""
-    scale = float(np.abs(problem.derivatives(_straight_line_speeds(problem)).f_y).max())
+    scale = float(np.abs(problem.derivatives(problem.straight_line_speeds).f_y).max())
     return replace(sqp.init(problem, v, OPTIONS), largest_gradient=scale)
-
-
-def _straight_line_speeds(problem: FastestPolyline) -> np.ndarray:
-    """Speeds down the straight line to B."""
-    return problem.speeds(problem.depth * problem.x[1:-1] / problem.x[-1])
 
 
 def _speeds_along(problem: FastestPolyline, nodes: np.ndarray) -> np.ndarray:
     """Speeds down the curve through `nodes`, stretched to the problem's ends; down the straight
     line where a bead is there sooner."""
-    straight = _straight_line_speeds(problem)
+    straight = problem.straight_line_speeds
     scale = np.array([problem.x[-1], problem.depth]) / nodes[-1]
     v = problem.speeds(np.interp(problem.x[1:-1], *(scale * nodes).T))
     return v if problem.values(v).f < problem.values(straight).f else straight

@@ -17,14 +17,9 @@ def programme(across: float, depth: float, segments: int, **more: float) -> Fast
     return FastestPolyline(grid_abscissae(across, segments, "clustered"), depth, G, **more)
 
 
-def line_speeds(problem: FastestPolyline) -> np.ndarray:
-    """Of the straight line."""
-    return problem.speeds(problem.depth * problem.x[1:-1] / problem.x[-1])
-
-
 def some_speeds(problem: FastestPolyline, seed: int) -> np.ndarray:
     """Of a jagged curve."""
-    v = line_speeds(problem)
+    v = problem.straight_line_speeds
     return v * np.random.default_rng(seed).uniform(0.7, 1.5, len(v))
 
 
@@ -74,7 +69,7 @@ def test_the_error_falls_at_the_order_of_the_grid(name: str, order: float) -> No
     errors = []
     for N in (40, 80, 160):
         problem = FastestPolyline(grid_abscissae(2.0, N, name), 1.0, G)
-        at = sqp.solve(problem, line_speeds(problem), OPTIONS)
+        at = sqp.solve(problem, problem.straight_line_speeds, OPTIONS)
         assert at.converged
         errors.append(at.values.f / best - 1.0)
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
@@ -84,7 +79,7 @@ def test_the_error_falls_at_the_order_of_the_grid(name: str, order: float) -> No
 @pytest.mark.parametrize("ends", [(2.0, 1.0), (1.0, 1.0), (0.3, 2.3), (3.0, 0.7)])
 def test_with_100_segments_it_is_within_1e_4_of_the_cycloid(ends: tuple[float, float]) -> None:
     problem = programme(*ends, 100)
-    at = sqp.solve(problem, line_speeds(problem), OPTIONS)
+    at = sqp.solve(problem, problem.straight_line_speeds, OPTIONS)
     assert at.converged
     assert 0.0 < 1e-3 * at.values.f / fastest_descent(*ends, G).time - 1.0 < 1e-4
 
@@ -92,7 +87,7 @@ def test_with_100_segments_it_is_within_1e_4_of_the_cycloid(ends: tuple[float, f
 def test_on_a_floor_at_the_depth_of_b_it_falls_on_half_a_cycloid_and_goes_level() -> None:
     w, h = 3.0, 0.5
     problem = programme(w, h, 200, floor=h)
-    at = sqp.solve(problem, line_speeds(problem), OPTIONS)
+    at = sqp.solve(problem, problem.straight_line_speeds, OPTIONS)
     assert at.converged
     r = h / 2.0
     exact = np.pi * np.sqrt(r / G) + (w - np.pi * r) / np.sqrt(2.0 * G * h)

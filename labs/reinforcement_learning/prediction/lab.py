@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from labs.arrays import episodes_done
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.params import Value
 from labs.random_numbers import random_states
@@ -143,7 +144,7 @@ class PredictionLab(Lab[PredictionParams, PredictionState]):
             return measured
         x = params.looked_at
         return {
-            "trained": float(online.episodes_done(training)),
+            "trained": float(episodes_done(training)),
             "walked": float(state.live.episodes),
             "walker_mc": float(state.live.V[0, x]),
             "walker_td": float(state.live.V[1, x]),

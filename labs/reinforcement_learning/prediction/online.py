@@ -16,7 +16,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from labs.algorithms.prediction import EVERY_VISIT, FIRST_VISIT, TD0, Predictors, init, step
-from labs.arrays import Training
+from labs.arrays import Training, episodes_done
 from labs.lab import Snapshot
 from labs.number_texts import count_text
 from labs.reinforcement_learning.prediction.params import PredictionParams
@@ -58,11 +58,6 @@ def learn(params: PredictionParams, training: Training) -> Iterator[Snapshot]:
             else ""
         )
         yield Snapshot(i, training, done, learned / wanted)
-
-
-def episodes_done(training: Training) -> int:
-    """Each learner's episodes so far."""
-    return int(training["episodes"][-1]) if len(training["episodes"]) else 0
 
 
 def error_decomposition(world: PredictionWorld, V: np.ndarray) -> tuple[float, float, float]:

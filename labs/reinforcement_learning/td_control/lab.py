@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from labs.arrays import Training
+from labs.arrays import Training, episodes_done
 from labs.lab import Handle, Inputs, Lab, Measurement, Snapshot, State
 from labs.number_texts import count_text
 from labs.params import Value
@@ -21,7 +21,6 @@ from labs.reinforcement_learning.td_control.plots import ORDER, PLOTS, learner_m
 from labs.reinforcement_learning.td_control.tasks import ControlTask
 from labs.reinforcement_learning.td_control.training import (
     batch_size,
-    episodes_done,
     fits_task,
     initial_training,
     train,

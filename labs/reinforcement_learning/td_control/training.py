@@ -22,7 +22,7 @@ from labs.algorithms.exploration import BehaviourPolicy
 from labs.algorithms.policy_evaluation import exact_values
 from labs.algorithms.td_control import SARSA_LAMBDA, Learners, greedy_costs, init, step
 from labs.algorithms.td_lambda import NEGLIGIBLE_TRACE
-from labs.arrays import Training
+from labs.arrays import Training, episodes_done
 from labs.problems.episodes import UpdateRule
 from labs.reinforcement_learning.td_control.tasks import ControlTask
 
@@ -120,11 +120,6 @@ def batch_size(
         traces = min(length, memory, task.q_star.size) if method == SARSA_LAMBDA else 0.0
         load += seeds * length * (STEP_TIME + TRACE_TIME * traces)
     return int(np.clip(BATCH_TIME / max(load, 1.0), 1, most))
-
-
-def episodes_done(training: Training) -> int:
-    """Each learner's episodes so far."""
-    return int(training["episodes"][-1]) if len(training["episodes"]) else 0
 
 
 def fits_task(training: Training, task: ControlTask) -> bool:

@@ -46,7 +46,7 @@ from labs.reinforcement_learning.dynamic_programming.tasks import (
 )
 from labs.scene import Scene
 from labs.tasks.grid_world.cells import CellWorld
-from labs.tasks.grid_world.map import MAPS, GridWorld, grid_world
+from labs.tasks.grid_world.map import MAPS, GridWorld
 from labs.tasks.grid_world.params import BOOK_WORLDS, edit_map
 from labs.tasks.grid_world.picture import draw_board, draw_path, draw_walkers, value_span
 from labs.tasks.grid_world.walk import GridWalk, nominal_path
@@ -186,7 +186,7 @@ class DynamicProgramming(Lab[DynamicProgrammingParams, DynamicProgrammingState])
         point: tuple[float, float, float],
     ) -> Mapping[str, Value]:
         """The map with the cell clicked as the brush says."""
-        return edit_map(grid_world(params.map, params.kings), params.brush, handle, point)
+        return edit_map(params.map, params.brush, handle, point)
 
     def measure(
         self, params: DynamicProgrammingParams, state: DynamicProgrammingState

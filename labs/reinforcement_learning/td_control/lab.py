@@ -28,7 +28,7 @@ from labs.reinforcement_learning.td_control.training import (
 )
 from labs.scene import Scene
 from labs.tasks.grid_world.cells import CellWorld
-from labs.tasks.grid_world.map import MAPS, GridWorld, grid_world
+from labs.tasks.grid_world.map import MAPS, GridWorld
 from labs.tasks.grid_world.params import BOOK_WORLDS, edit_map
 from labs.tasks.grid_world.picture import draw_board, draw_path, draw_walkers, value_span
 from labs.tasks.grid_world.walk import GridWalk, nominal_path
@@ -154,7 +154,7 @@ class TdControl(Lab[TdParams, TdState]):
         self, params: TdParams, handle: str, point: tuple[float, float, float]
     ) -> Mapping[str, Value]:
         """The map with the cell clicked as the brush says."""
-        return edit_map(grid_world(params.map, params.kings), params.brush, handle, point)
+        return edit_map(params.map, params.brush, handle, point)
 
     def measure(self, params: TdParams, state: TdState) -> Measurement:
         task, training = params.task, state.training

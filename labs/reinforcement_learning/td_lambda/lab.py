@@ -35,7 +35,7 @@ from labs.reinforcement_learning.td_lambda.sweep import (
     run_sweep,
 )
 from labs.scene import Scene
-from labs.tasks.grid_world.map import MAPS, grid_world
+from labs.tasks.grid_world.map import MAPS
 from labs.tasks.grid_world.params import edit_map
 from labs.tasks.random_walk.picture import state_names
 from labs.tasks.random_walk.walks import NINETEEN_STATE_WALK
@@ -135,7 +135,7 @@ class TdLambda(Lab[TdLambdaParams, TdLambdaState]):
         self, params: TdLambdaParams, handle: str, point: tuple[float, float, float]
     ) -> Mapping[str, Value]:
         """The map with the cell clicked as the brush says."""
-        return edit_map(grid_world(params.map, False), params.brush, handle, point)
+        return edit_map(params.map, params.brush, handle, point)
 
     def measure(self, params: TdLambdaParams, state: TdLambdaState) -> Measurement:
         numbers: dict[str, float | np.ndarray] = {

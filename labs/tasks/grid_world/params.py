@@ -5,7 +5,7 @@ from typing import Annotated
 
 from labs.errors import LabError, ParameterError
 from labs.params import Value, validated_by
-from labs.tasks.grid_world.map import MAPS, GridWorld, grid_world
+from labs.tasks.grid_world.map import MAPS, grid_world
 from labs.tasks.grid_world.picture import BOARD, board
 
 MAP_LENGTH = 8000
@@ -28,11 +28,12 @@ MapText = Annotated[str, validated_by(lambda text: grid_world(text, False))]
 
 
 def edit_map(
-    world: GridWorld, brush: str, handle: str, point: tuple[float, float, float]
+    text: str, brush: str, handle: str, point: tuple[float, float, float]
 ) -> Mapping[str, Value]:
-    """The field `map` once the board is clicked at `point` [m]: the cell there is of the kind
-    `brush`, or free where it was a wall, a hole or a cliff already. Empty where no cell was
-    clicked. Raises ParameterError."""
+    """The field `map`, so far `text`, once the board is clicked at `point` [m]: the cell there is
+    of the kind `brush`, or free where it was a wall, a hole or a cliff already. Empty where no cell
+    was clicked. Raises ParameterError."""
+    world = grid_world(text, False)
     cell = board(world).cell_at(point)
     if handle != BOARD or cell is None:
         return {}

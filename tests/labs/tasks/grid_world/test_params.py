@@ -21,7 +21,7 @@ class MapParams(Params):
 def click(row: int, column: int, brush: str, world: GridWorld = WORLD) -> object:
     """The map after a click in the middle of a cell."""
     x, y, z = map(float, board(world).centers[row, column])
-    return edit_map(world, brush, "board", (x, y, z))["map"]
+    return edit_map(world.text, brush, "board", (x, y, z))["map"]
 
 
 def test_a_map_that_is_none_is_refused_in_a_sentence() -> None:
@@ -46,8 +46,8 @@ def test_a_wall_or_a_cliff_clicked_once_more_is_free() -> None:
 
 
 def test_other_clicks_change_nothing_or_say_why() -> None:
-    assert edit_map(WORLD, "#", "board", (9.0, 9.0, 0.0)) == {}
+    assert edit_map(WORLD.text, "#", "board", (9.0, 9.0, 0.0)) == {}
     x, y, z = map(float, board(WORLD).centers[0, 0])
-    assert edit_map(WORLD, "#", "token", (x, y, z)) == {}
+    assert edit_map(WORLD.text, "#", "token", (x, y, z)) == {}
     with pytest.raises(ParameterError, match="no goal"):
         click(1, 2, "#")

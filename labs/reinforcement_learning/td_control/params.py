@@ -4,7 +4,7 @@ import numpy as np
 
 from labs.algorithms import exploration
 from labs.algorithms.exploration import BehaviourPolicy
-from labs.params import Condition, Group, Params
+from labs.params import Group, Params
 from labs.problems.episodes import UpdateRule
 from labs.reinforcement_learning.td_control.tasks import (
     LARGEST_GAMMA,
@@ -16,6 +16,7 @@ from labs.reinforcement_learning.td_control.tasks import (
 from labs.tasks.grid_world.map import MAPS
 from labs.tasks.grid_world.params import MAP_LENGTH, MapText
 from labs.tasks.mdp_table.params import TABLE_LENGTH, TAXICAB, TableText
+from labs.tasks.method_pair.params import chosen_methods, where_chosen
 
 LEARNING_METHODS = {
     "q-learning": "Q-learning",
@@ -45,11 +46,6 @@ WORLD = Group("World", effect="solve")
 LEARNING = Group("Learning", effect="solve")
 EXPLORATION = Group("Exploration", effect="solve")
 VIEW = Group("View")
-
-
-def _if_method(method: str) -> Condition:
-    """Where one of the two methods is this one."""
-    return ({"method": method}, {"second": method})
 
 
 class TdParams(Params):
@@ -123,7 +119,7 @@ class TdParams(Params):
     )
     """Orange. Both begin with the same luck."""
     n: float = LEARNING.knob(
-        4, 1, 20, "n", "", "Steps", step=1, key=True, when=_if_method("sarsa-n")
+        4, 1, 20, "n", "", "Steps", step=1, key=True, when=where_chosen("sarsa-n")
     )
     """Costs that SARSA(n) waits for before it trusts its estimate of the rest."""
     decay: float = LEARNING.knob(
@@ -135,12 +131,12 @@ class TdParams(Params):
         "Trace decay",
         step=0.01,
         key=True,
-        when=_if_method("sarsa-lambda"),
+        when=where_chosen("sarsa-lambda"),
     )
     """Of SARSA(λ): 0 is SARSA, 1 waits for all costs of the episode."""
-    replacing: bool = LEARNING.toggle(False, "Replacing traces", when=_if_method("sarsa-lambda"))
+    replacing: bool = LEARNING.toggle(False, "Replacing traces", when=where_chosen("sarsa-lambda"))
     """A pair met again has trace 1 instead of one more; keeps SARSA(λ) from diverging."""
-    offline: bool = LEARNING.toggle(False, "Learn at the end", when=_if_method("sarsa-lambda"))
+    offline: bool = LEARNING.toggle(False, "Learn at the end", when=where_chosen("sarsa-lambda"))
     """SARSA(λ) takes all updates of an episode at its end."""
     alpha: float = LEARNING.knob(0.5, 0.0, 1.0, r"\alpha", "", "Step size", step=0.01, key=True)
     """How far one surprise moves an estimate."""
@@ -227,7 +223,7 @@ class TdParams(Params):
     @property
     def methods(self) -> list[str]:
         """The names of one or two methods."""
-        return [self.method] if self.second == "none" else [self.method, self.second]
+        return chosen_methods(self.method, self.second)
 
     @property
     def method_numbers(self) -> list[int]:

@@ -1,16 +1,16 @@
 """What the user turns in TD(lambda): where, by which method, and what is measured and shown."""
 
-from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import AfterValidator
 
 from labs.algorithms import prediction
-from labs.params import Condition, Group, Params
+from labs.params import Group, Params
 from labs.problems.episodes import UpdateRule
 from labs.reinforcement_learning.td_lambda.tasks import PredictionPlace, grid_place, walk_place
 from labs.tasks.grid_world.map import MAPS, grid_world
 from labs.tasks.grid_world.params import MAP_LENGTH, MapText
+from labs.tasks.method_pair.params import chosen_methods, where_chosen
 
 TD_METHODS = {
     "n-step": "n-step TD",
@@ -58,11 +58,6 @@ def _require_reachable_goal(text: str) -> str:
 OpenMap = Annotated[MapText, AfterValidator(_require_reachable_goal)]
 
 
-def _if_method(methods: Sequence[str]) -> Condition:
-    """Where one of the two methods is among these."""
-    return ({"method": methods}, {"second": methods})
-
-
 class TdLambdaParams(Params):
     """What the user can turn."""
 
@@ -94,7 +89,7 @@ class TdLambdaParams(Params):
     )
     """Orange. Both meet the same episodes."""
     n: float = LEARNING.knob(
-        4, 1, 64, "n", "", "Steps", step=1, key=True, when=_if_method(["n-step"])
+        4, 1, 64, "n", "", "Steps", step=1, key=True, when=where_chosen("n-step")
     )
     """Costs to wait for before the rest is taken from the table."""
     lam: float = LEARNING.knob(
@@ -106,13 +101,13 @@ class TdLambdaParams(Params):
         "Trace decay",
         step=0.01,
         key=True,
-        when=_if_method(LAMBDA_METHODS),
+        when=where_chosen(*LAMBDA_METHODS),
     )
     """Of one n-step return to the next: 0 is TD(0), 1 Monte Carlo."""
     alpha: float = LEARNING.knob(0.4, 0.0, 1.0, r"\alpha", "", "Step size", step=0.01, key=True)
     """The part of the way to its target that an estimate moves."""
     offline: bool = LEARNING.toggle(
-        False, "Learn at the end", key=True, when=_if_method(OFFLINE_METHODS)
+        False, "Learn at the end", key=True, when=where_chosen(*OFFLINE_METHODS)
     )
     """The values stand still through an episode and take all its updates at its end."""
     episodes: float = LEARNING.knob(10, 1, 100, "K", "", "Episodes", scale="linear", step=1)
@@ -143,7 +138,7 @@ class TdLambdaParams(Params):
     @property
     def methods(self) -> list[str]:
         """The names of one or two methods."""
-        return [self.method] if self.second == "none" else [self.method, self.second]
+        return chosen_methods(self.method, self.second)
 
     def rule(self, method: str) -> UpdateRule:
         """How estimates move by this method."""

@@ -9,7 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
-from labs.colors import to_oklab
+from labs.colors import from_linear, to_linear, to_oklab
 
 VISIONS: Mapping[str, np.ndarray] = {
     "usual": np.eye(3),
@@ -37,16 +37,9 @@ VISIONS: Mapping[str, np.ndarray] = {
 }
 
 
-def to_linear(srgb: np.ndarray) -> np.ndarray:
-    """Light intensities (..., 3) of sRGB colours (..., 3) in [0, 1]."""
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
-
-
 def simulate_vision(srgb: np.ndarray, vision: str) -> np.ndarray:
     """sRGB colours (..., 3) as they look to this vision."""
-    light = np.clip(to_linear(srgb) @ VISIONS[vision].T, 0.0, 1.0)
-    curved = 1.055 * np.maximum(light, 1e-9) ** (1 / 2.4) - 0.055
-    return np.asarray(np.where(light <= 0.0031308, 12.92 * light, curved))
+    return from_linear(np.clip(to_linear(srgb) @ VISIONS[vision].T, 0.0, 1.0))
 
 
 def color_distances(colors: Mapping[str, Sequence[float]]) -> Iterator[tuple[float, str]]:

@@ -15,6 +15,7 @@ from labs.reactive_control.differential_kinematics.lab import (
 from labs.reactive_control.differential_kinematics.params import DifferentialParams
 from labs.scene import Color, NullScene
 from tests.labs.experiments import ArticleExperiments
+from tests.labs.recording import record
 
 LAB = DifferentialKinematics()
 ARTICLE = ArticleExperiments("labs.reactive_control", "differential_kinematics")
@@ -41,8 +42,7 @@ def states(
 @lru_cache
 def recorded(params: DifferentialParams, seconds: float) -> Mapping[str, np.ndarray]:
     """All measured channels at every step from t = 0 on."""
-    rows = [LAB.measure(params, state) for state in states(params, seconds)]
-    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return record(LAB, params, states(params, seconds))
 
 
 def channel(params: DifferentialParams, name: str, seconds: float) -> np.ndarray:

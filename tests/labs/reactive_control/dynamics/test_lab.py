@@ -17,6 +17,7 @@ from labs.reactive_control.dynamics.params import DynamicsParams
 from labs.scene import NullScene
 from labs.tasks.arm.postures import POSED_ARMS
 from tests.labs.experiments import ArticleExperiments
+from tests.labs.recording import record
 
 LAB = ArmDynamics()
 ARTICLE = ArticleExperiments("labs.reactive_control", "dynamics")
@@ -49,8 +50,7 @@ def last(params: DynamicsParams, seconds: float) -> DynamicsState:
 
 def rows(params: DynamicsParams, seconds: float) -> dict[str, np.ndarray]:
     """Every measured channel over time."""
-    measured: list[Any] = [LAB.measure(params, s) for s in states(params, seconds)]
-    return {name: np.array([row[name] for row in measured]) for name in measured[0]}
+    return record(LAB, params, states(params, seconds))
 
 
 def at_start(setting: Mapping[str, Value], **changes: Value) -> dict[str, np.ndarray]:

@@ -22,6 +22,7 @@ from labs.reactive_control.kinematics.lab import MAX_AMPLIFICATION, Kinematics, 
 from labs.reactive_control.kinematics.params import KinematicsParams
 from labs.scene import NullScene
 from tests.labs.experiments import ArticleExperiments
+from tests.labs.recording import record
 
 LAB = Kinematics()
 ARTICLE = ArticleExperiments("labs.reactive_control", "kinematics")
@@ -41,8 +42,7 @@ def states(params: KinematicsParams, seconds: float) -> Iterator[KinematicsState
 
 def recorded(params: KinematicsParams, seconds: float = 4.0) -> Mapping[str, np.ndarray]:
     """Every channel over time; 4 s are a whole wobble at the experiments' 0.25 Hz."""
-    rows = [LAB.measure(params, state) for state in states(params, seconds)]
-    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    return record(LAB, params, states(params, seconds))
 
 
 def fields(params: KinematicsParams) -> Mapping[str, np.ndarray]:

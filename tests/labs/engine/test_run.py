@@ -19,6 +19,7 @@ from labs.engine.headless import MAX_STEPS, run_headless
 from labs.engine.run import World
 from labs.errors import LabError, ParameterError, UnknownLab
 from server.cli import _arguments_of_options, _parser
+from tests.labs.solving import solve
 
 
 def make_world(**changes: object) -> World:
@@ -32,8 +33,7 @@ def advanced_world(world: World, steps: int) -> World:
 
 
 def solved(world: World) -> World:
-    while world.solving:
-        world.iterate()
+    solve(world)
     return world
 
 

@@ -15,14 +15,13 @@ from labs.appendix.integration.params import (
     IMPLICIT_METHODS,
     METHOD_NAMES,
 )
-from labs.engine.catalog import find_lab
-from labs.engine.run import World
 from tests.labs.appendix.integration.runs import (
     LAB,
     ORDERS,
     of_method,
     solved,
 )
+from tests.labs.solving import solve, solved_world
 
 
 @pytest.mark.parametrize("system", ["pendulum", "double-pendulum"])
@@ -114,13 +113,10 @@ def test_local_errors_are_those_of_one_step() -> None:
 
 
 def test_the_study_starts_again_when_the_tableau_changes() -> None:
-    world = World(find_lab("integration"))
-    while world.solving:
-        world.iterate()
+    world = solved_world("integration", {})
     before = world.state.global_errors.copy()
     world.change({"tableau": "0 | ; | 1"})
     assert world.solving
-    while world.solving:
-        world.iterate()
+    solve(world)
     np.testing.assert_array_equal(world.state.global_errors[7], before[0])
     np.testing.assert_array_equal(world.state.global_errors[:7], before[:7])

@@ -5,7 +5,6 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from labs.engine.catalog import find_lab
 from labs.engine.run import World
 from labs.optimal_control.brachistochrone.lab import BrachistochroneState
 from labs.optimal_control.brachistochrone.race import (
@@ -19,19 +18,15 @@ from labs.optimal_control.brachistochrone.race import (
     BeadRace,
     simulate_race,
 )
-from labs.params import Value
 from tests.labs.experiments import ArticleExperiments
+from tests.labs.solving import Settings, solved_world
 
 EXPERIMENTS = ArticleExperiments("labs.optimal_control", "brachistochrone")
 verify = EXPERIMENTS.verify
-Settings = Mapping[str, Value]
 
 
 def solved(setting: Settings) -> World:
-    world = World(find_lab("brachistochrone"), setting)
-    while world.solving:
-        world.iterate()
-    return world
+    return solved_world("brachistochrone", setting)
 
 
 def state(world: World) -> BrachistochroneState:

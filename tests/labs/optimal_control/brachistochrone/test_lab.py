@@ -15,6 +15,7 @@ from tests.labs.optimal_control.brachistochrone.test_article import (
     solved,
     state,
 )
+from tests.labs.solving import solve, solve_to_convergence
 
 # The race -------------------------------------------------------------------------------------
 
@@ -61,8 +62,7 @@ def test_out_of_reach_is_said_and_nothing_is_solved() -> None:
     shown = world.lab.measure(world.params, world.state)
     assert not [name for name in shown if name.startswith(("behind", "fastest"))]
     world.change({"mu": 0.1})
-    while world.solving:
-        world.iterate()
+    solve(world)
     assert delays(world)[OPTIMISED] < 0.2
 
 
@@ -83,8 +83,7 @@ def test_what_is_dragged_follows_the_hand() -> None:
     world = solved({})
     world.hold("B", (0.3, 1.504, 0.2))
     assert (world.params.x_b, world.params.z_b) == (1.5, 0.2)  # type: ignore[attr-defined]
-    while world.solving:
-        world.iterate()
+    solve(world)
     assert delays(world)[OPTIMISED] < 0.1
     world.hold("A", (0.0, 0.1, 1.5))
     world.hold("knee", (0.0, 0.6, 0.7))
@@ -110,15 +109,11 @@ def test_a_warm_start_is_shorter_and_stays_where_it_was() -> None:
     cold = len(excess(world))
     world.change({"start": "warm"})
     world.change({"g": 9.0})
-    while world.solving:
-        world.iterate()
+    solve(world)
     assert len(excess(world)) < 0.7 * cold
     assert excess(world)[0] < 1.0
     world.change({"grid": "even", "segments": 25.0, "z_b": 0.3})
-    while world.solving:
-        world.iterate()
-    assert world.latest is not None
-    assert world.latest.done.startswith("Converged")
+    solve_to_convergence(world)
 
 
 def test_looking_back_races_that_curve() -> None:

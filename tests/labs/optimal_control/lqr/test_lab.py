@@ -20,6 +20,7 @@ from tests.labs.optimal_control.lqr.simulation import (
     solved,
     states,
 )
+from tests.labs.solving import solve
 
 # The world ------------------------------------------------------------------------------------
 
@@ -163,8 +164,7 @@ def test_the_study_is_the_same_every_time() -> None:
     for system in ("cart-pole", "ur5"):
         one, other = (World(find_lab("lqr"), {"system": system}) for _ in range(2))
         for world in (one, other):
-            while world.solving:
-                world.iterate()
+            solve(world)
         np.testing.assert_array_equal(one.state.differences, other.state.differences)
         np.testing.assert_array_equal(one.state.region, other.state.region)
 

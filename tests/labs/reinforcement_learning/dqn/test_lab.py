@@ -17,6 +17,7 @@ from labs.reinforcement_learning.dqn.controllers import baseline_costs
 from labs.reinforcement_learning.dqn.tasks import learning_task, posture_at
 from labs.tasks.environments.reach import reach
 from tests.labs.experiments import ArticleExperiments
+from tests.labs.solving import solve, solved_world
 
 EXPERIMENTS = ArticleExperiments("labs.reinforcement_learning", "dqn")
 ENTRY = find_lab("dqn")
@@ -24,10 +25,7 @@ ENTRY = find_lab("dqn")
 
 def trained(setting: Mapping[str, Value], **changes: Value) -> World:
     """A world whose training has ended."""
-    world = World(ENTRY, {**setting, **changes})
-    while world.solving:
-        world.iterate()
-    return world
+    return solved_world("dqn", {**setting, **changes})
 
 
 def first_below(world: World, cost: float) -> np.ndarray:
@@ -191,8 +189,7 @@ def test_more_steps_go_on_from_what_was_learned() -> None:
     world.change({"alpha": 2e-3})
     assert world.solving
     np.testing.assert_array_equal(world.state.training["w"], w)
-    while world.solving:
-        world.iterate()
+    solve(world)
     assert world.state.training["last_steps"][0] >= 4000
 
 

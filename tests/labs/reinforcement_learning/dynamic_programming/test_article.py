@@ -13,7 +13,7 @@ from labs.tasks.pendulum_table.table import PendulumGrid
 from tests.labs.experiments import ArticleExperiments
 from tests.labs.reinforcement_learning.dynamic_programming.worlds import (
     SLUG,
-    Setting,
+    Settings,
     params_of,
     solved,
 )
@@ -36,7 +36,7 @@ def finite_horizon_path(world: World, steps: int) -> np.ndarray:
 
 
 @ARTICLE.verify("Little time left")
-def test_with_little_time_one_gets_close_instead_of_around(setting: Setting) -> None:
+def test_with_little_time_one_gets_close_instead_of_around(setting: Settings) -> None:
     world = solved(setting)
     assert params_of(world).to_go == 9
     values, _ = finite_horizon(world.state.task, params_of(world).w_f)
@@ -60,7 +60,7 @@ def test_with_little_time_one_gets_close_instead_of_around(setting: Setting) -> 
 
 
 @ARTICLE.verify("What wandering costs")
-def test_the_wanderer_has_the_published_values(setting: Setting) -> None:
+def test_the_wanderer_has_the_published_values(setting: Settings) -> None:
     world = solved(setting)
     place = world.state.tabular_task.place
     assert isinstance(place, GridWorld)
@@ -74,7 +74,7 @@ def test_the_wanderer_has_the_published_values(setting: Setting) -> None:
 
 
 @ARTICLE.verify("A wave from the goal")
-def test_values_spread_a_step_a_sweep(setting: Setting) -> None:
+def test_values_spread_a_step_a_sweep(setting: Settings) -> None:
     world = World(find_lab(SLUG), setting)
     S = start_of(world)
     true_at = 0
@@ -92,7 +92,7 @@ def test_values_spread_a_step_a_sweep(setting: Setting) -> None:
 
 
 @ARTICLE.verify("Keep off the edge")
-def test_who_may_slip_keeps_off_the_edge(setting: Setting) -> None:
+def test_who_may_slip_keeps_off_the_edge(setting: Settings) -> None:
     def rows(slip: float) -> tuple[int, set[int]]:
         """Steps of the way meant, and the rows it visits between its ends."""
         task = solved({**setting, "slip": slip}).state.tabular_task
@@ -116,7 +116,7 @@ def angles(world: World, seconds: float) -> np.ndarray:
 
 
 @ARTICLE.verify("The price of life")
-def test_how_dear_life_is_decides_the_way(setting: Setting) -> None:
+def test_how_dear_life_is_decides_the_way(setting: Settings) -> None:
     def controls(living: float) -> tuple[int, float]:
         """In the bottom row beside its last cell; and V of the start."""
         world = solved({**setting, "living": living})
@@ -135,7 +135,7 @@ def test_how_dear_life_is_decides_the_way(setting: Setting) -> None:
 
 
 @ARTICLE.verify("Where does a taxi wait?")
-def test_a_taxi_waits_at_the_stand(setting: Setting) -> None:
+def test_a_taxi_waits_at_the_stand(setting: Settings) -> None:
     world = solved(setting)
     place, mdp = world.state.tabular_task.place, world.state.tabular_task.mdp
     np.testing.assert_allclose(-mdp.C[0], [8.0, 2.75, 4.25])
@@ -150,7 +150,7 @@ def test_a_taxi_waits_at_the_stand(setting: Setting) -> None:
 
 
 @ARTICLE.verify("Swing up by table")
-def test_the_table_swings_the_pendulum_up(setting: Setting) -> None:
+def test_the_table_swings_the_pendulum_up(setting: Settings) -> None:
     world = solved(setting)
     off = angles(world, 30.0)
     assert 1.9 < 0.01 * np.flatnonzero(off < 0.2)[0] < 2.3
@@ -168,7 +168,7 @@ def test_the_table_swings_the_pendulum_up(setting: Setting) -> None:
 
 
 @ARTICLE.verify("Too short-sighted to swing")
-def test_a_small_discount_leaves_it_hanging(setting: Setting) -> None:
+def test_a_small_discount_leaves_it_hanging(setting: Settings) -> None:
     assert angles(solved(setting), 8.0).min() > 1.0
     assert angles(solved({**setting, "gamma": 0.8}), 8.0).min() < 0.01
     assert setting["gamma"] == 0.5
@@ -178,7 +178,7 @@ def test_a_small_discount_leaves_it_hanging(setting: Setting) -> None:
 
 
 @ARTICLE.verify("Too coarse a table")
-def test_a_coarse_table_does_not_see_that_it_hangs(setting: Setting) -> None:
+def test_a_coarse_table_does_not_see_that_it_hangs(setting: Settings) -> None:
     world = solved(setting)
     place = world.state.tabular_task.place
     assert isinstance(place, PendulumGrid)
@@ -212,7 +212,7 @@ def test_a_coarse_table_does_not_see_that_it_hangs(setting: Setting) -> None:
 
 
 @ARTICLE.verify("Six joints, ten values each")
-def test_the_counter_reaches_the_number_of_the_notes(setting: Setting) -> None:
+def test_the_counter_reaches_the_number_of_the_notes(setting: Settings) -> None:
     world = solved(setting)
     measured = world.lab.measure(world.params, world.state)
     assert measured["states"] == 1e12

@@ -21,6 +21,7 @@ from tests.labs.reinforcement_learning.dynamic_programming.worlds import (
     params_of,
     solved,
 )
+from tests.labs.solving import solve
 from tests.labs.tasks.recording_scene import RecordingScene
 
 # Solving --------------------------------------------------------------------------------------
@@ -33,8 +34,7 @@ def test_four_iterations_from_one_seed_reach_their_limits() -> None:
     assert np.ptp(V, axis=0).max() == 0.0
     assert 5.0 < V.std() < 7.0
     assert not np.array_equal(V, other.state.iterates.V)
-    while one.solving:
-        one.iterate()
+    solve(one)
     at, found = one.state.iterates, one.state.tabular_task
     np.testing.assert_allclose(at.V, found.limits, atol=1e-4)
     bound = one.lab.fields(one.params, one.state)
@@ -79,8 +79,7 @@ def test_a_warm_start_takes_fewer_sweeps() -> None:
     for warm in (True, False):
         world = solved({"world": "pendulum", "gamma": 0.95, "warm": warm})
         world.change({"gamma": 0.951})
-        while world.solving:
-            world.iterate()
+        solve(world)
         sweeps[warm] = world.state.iterates.count
         np.testing.assert_allclose(
             world.state.iterates.V, world.state.tabular_task.limits, atol=1e-4
@@ -164,8 +163,7 @@ def test_a_click_edits_the_map() -> None:
 
     def click(row: int, column: int) -> str:
         world.hold("board", tuple(map(float, centers[row, column])))  # type: ignore[arg-type]
-        while world.solving:
-            world.iterate()
+        solve(world)
         for _ in range(40):
             world.advance()
         return str(params_of(world).map.splitlines()[row][column])
@@ -253,8 +251,7 @@ def test_a_torque_is_held_whatever_a_new_table_offers() -> None:
     world.change({"levels": 3})
     world.iterate()
     assert torque() == held
-    while world.solving:
-        world.iterate()
+    solve(world)
     for _ in range(15):
         world.advance()
     assert torque() in (-2.5, 0.0, 2.5)

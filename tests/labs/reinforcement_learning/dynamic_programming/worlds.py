@@ -1,22 +1,16 @@
 """Worlds of the lab on dynamic programming, for its tests."""
 
-from collections.abc import Mapping
-
-from labs.engine.catalog import find_lab
 from labs.engine.run import World
-from labs.params import Value
 from labs.reinforcement_learning.dynamic_programming.params import DynamicProgrammingParams
+from tests.labs.solving import Settings as Settings
+from tests.labs.solving import solved_world
 
 SLUG = "dynamic-programming"
-Setting = Mapping[str, Value]
 
 
-def solved(setting: Setting) -> World:
+def solved(setting: Settings) -> World:
     """A world whose iterations are over."""
-    world = World(find_lab(SLUG), setting)
-    while world.solving:
-        world.iterate()
-    return world
+    return solved_world(SLUG, setting)
 
 
 def params_of(world: World) -> DynamicProgrammingParams:

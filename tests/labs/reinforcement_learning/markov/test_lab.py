@@ -20,6 +20,7 @@ from labs.reinforcement_learning.markov.plots import GAMMAS
 from labs.reinforcement_learning.markov.reward_process import RewardProcess
 from labs.scene import NullScene
 from tests.labs.experiments import ArticleExperiments
+from tests.labs.solving import solve, solved_world
 
 LAB = Markov()
 ARTICLE = ArticleExperiments("labs.reinforcement_learning", "markov")
@@ -209,12 +210,9 @@ def test_every_experiment_is_verified() -> None:
 # Editing
 
 
-def begun(setting: Mapping[str, Value] | None = None) -> World:
+def begun(setting: Mapping[str, Value] = {}) -> World:
     """A world whose V is solved and whose time stands at 0."""
-    world = World(find_lab("markov"), setting)
-    while world.solving:
-        world.iterate()
-    return world
+    return solved_world("markov", setting)
 
 
 def test_a_bead_sets_its_probability_and_the_others_make_room() -> None:
@@ -345,8 +343,7 @@ def test_the_errors_begin_at_zero_iterations_whenever_something_is_turned() -> N
     whole = world.state.errors
     world.change({"gamma": 0.5})
     world.change({"gamma": 0.9})
-    while world.solving:
-        world.iterate()
+    solve(world)
     np.testing.assert_array_equal(world.state.errors, whole)
     assert whole[0] == pytest.approx(np.abs(process_of(world).cost_to_go(0.9).V).max())
 

@@ -11,7 +11,7 @@ from labs.reinforcement_learning.prediction.lab import PredictionLab
 from labs.reinforcement_learning.prediction.params import PredictionParams
 from labs.reinforcement_learning.prediction.targets import sample_targets
 from tests.labs.experiments import ArticleExperiments
-from tests.labs.solving import Settings, readouts, solved_world
+from tests.labs.solving import Settings, readouts, solve, solved_world
 
 EXPERIMENTS = ArticleExperiments("labs.reinforcement_learning", "prediction")
 SQRT_LEARNERS = 10.0
@@ -106,8 +106,7 @@ def test_shrinking_steps_converge(setting: Settings) -> None:
     assert mean["error_mc"] < min(found["error_mc"], numbers(setting, omega=0.8)["error_mc"])
     world = solved(setting)
     world.change({"omega": 0.0, "alpha_td": 0.1, "episodes": 100.0})
-    while world.solving:
-        world.iterate()
+    solve(world)
     spoiled = readouts(world)
     assert spoiled["trained"] == 2100.0
     assert spoiled["error_td"] > 0.05

@@ -23,6 +23,7 @@ from labs.scene import NullScene
 from labs.tasks.grid_world.map import MAPS, GridWorld
 from labs.tasks.grid_world.picture import board
 from tests.labs.experiments import ArticleExperiments
+from tests.labs.solving import solve, solved_world
 
 EXPERIMENTS = ArticleExperiments("labs.reinforcement_learning", "td_control")
 ENTRY = find_lab("td-control")
@@ -31,13 +32,7 @@ LAB = TdControl()
 
 def world_of(setting: Mapping[str, Value], **changes: Value) -> World:
     """A world whose training has ended."""
-    return trained(World(ENTRY, {**setting, **changes}))
-
-
-def trained(world: World) -> World:
-    while world.solving:
-        world.iterate()
-    return world
+    return solved_world("td-control", {**setting, **changes})
 
 
 def params_of(world: World) -> TdParams:
@@ -147,7 +142,7 @@ def test_accumulating_traces_diverge(setting: Mapping[str, Value]) -> None:
     assert "diverged" in world.trouble
     assert world.state.training["episodes"][-1] <= 10
     world.change({"replacing": True})
-    trained(world)
+    solve(world)
     assert not world.trouble
     assert world.state.training["episodes"][-1] == 500, "it began anew"
     assert EXPERIMENTS.answer("Traces pile up") == "They grow beyond all bounds."
@@ -159,7 +154,8 @@ def test_a_goal_close_by_is_found_at_once(setting: Mapping[str, Value]) -> None:
     assert (greedy(world) == 21.0).all()
     fresh = {}
     for cell in ((1, 11), (7, 2)):
-        moved = trained(clicked(world_of(setting), cell))
+        moved = clicked(world_of(setting), cell)
+        solve(moved)
         again = first_optimal(moved)
         fresh[cell] = first_optimal(world_of({**setting, "map": params_of(moved).map}))
         if cell == (1, 11):
@@ -326,7 +322,7 @@ def test_a_walk_survives_a_smaller_map() -> None:
     for _ in range(50):
         world.advance()
     LAB.draw(NullScene(), params_of(world), world.state)
-    trained(world)
+    solve(world)
     assert greedy(world).max() == 2.0
 
 

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -27,16 +28,21 @@ OUTPUTS: Mapping[str, tuple[Sequence[str], Writer]] = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Returns the exit code: 0, or 2 for wrong use."""
+    """Returns the exit code: 0, 2 for wrong use, or what a signal would end it with."""
     parser = _parser()
     options = parser.parse_args(arguments)
     try:
-        return {"serve": _serve, "list": _list, "run": _run}[options.command or "serve"](options)
+        code = {"serve": _serve, "list": _list, "run": _run}[options.command or "serve"](options)
+        sys.stdout.flush()
+        return code
     except LabError as error:
         print(f"orclab: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
+    except BrokenPipeError:  # who read it has seen enough, as `| head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -88,6 +88,18 @@ def test_list_has_a_line_a_lab(orclab: Orclab) -> None:
         assert entry.lab.title in line
 
 
+def test_a_reader_who_leaves_early_ends_it_quietly() -> None:
+    """As `orclab list | head -1` does."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "server", "list"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdout
+        assert process.stderr
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 141
+
+
 def test_version_is_the_one_recordings_name(orclab: Orclab) -> None:
     result = orclab("--version")
     assert (result.returncode, result.stdout.strip()) == (0, versions()["orclab"])

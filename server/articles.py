@@ -211,10 +211,8 @@ def _join_punctuation(state: StateCore) -> None:
             before = _cut_match(children, i - 1, r"[^\s\u200b]*\Z")
             after = _cut_match(children, i + 1, r"\A[^\s\u200b]*")
             if before or after:
-                opening, closing = (
-                    _html_token(f'<span class="joined">{before}'),
-                    _html_token(f"{after}</span>"),
-                )
+                opening = _html_token(f'<span class="joined">{before}')
+                closing = _html_token(f"{after}</span>")
                 children[i : i + 1] = [opening, children[i], closing]
 
 

@@ -23,7 +23,7 @@ TIMEOUT = 90.0
 
 
 class ServerProcess:
-    """`with Served(ORCLAB_SPARES="0") as server: server.http.get("/")`."""
+    """`with ServerProcess(ORCLAB_SPARES="0") as server: server.http.get("/")`."""
 
     def __init__(
         self, port: int = 0, wait: bool = True, stderr: IO[str] | None = None, **environment: str

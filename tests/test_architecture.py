@@ -63,17 +63,15 @@ def docstring(path: Path) -> str:
 MODULES = {module_of(path): path for path in sources("labs", "server", "tests")}
 
 
-def top_level_names(path: Path) -> Iterator[str]:
-    """What a module defines: classes, functions, constants and types."""
+def type_names(path: Path) -> Iterator[str]:
+    """The classes and types that a module defines."""
     for node in tree(path).body:
         match node:
             case (
                 ast.ClassDef(name=name)
-                | ast.FunctionDef(name=name)
-                | ast.AsyncFunctionDef(name=name)
-            ):
-                yield name
-            case ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)):
+                | ast.Assign(targets=[ast.Name(id=name)])
+                | ast.AnnAssign(target=ast.Name(id=name))
+            ) if CAMEL_CASE.fullmatch(name):
                 yield name
 
 
@@ -276,7 +274,7 @@ def test_a_type_has_a_name_of_its_own() -> None:
     """`PlannedMotion` and `MotionTask`, not two `Motion`: who searches for it finds it."""
     defined: dict[str, list[str]] = {}
     for path in sources("labs", "server"):
-        for name in filter(CAMEL_CASE.fullmatch, top_level_names(path)):
+        for name in type_names(path):
             defined.setdefault(name, []).append(name_of(path))
     assert len(defined) > 300
     assert not {name: paths for name, paths in defined.items() if len(paths) > 1}

@@ -104,7 +104,7 @@ def geometric_jacobian_rate(chain: PosedChain, v: np.ndarray) -> np.ndarray:
 
 
 def inverse_rpy_rate_matrix(angles: np.ndarray) -> np.ndarray:
-    """T^-1 (3, 3): phi_o' = T^-1 omega. It grows as 1 / cos(theta); within SMALLEST_COS of
+    """T^-1 (3, 3): phi_o' = T^-1 omega. It grows as 1 / cos(theta); within SMALLEST_COSINE of
     theta = +-pi/2, where T has no inverse, it stays at its value there and finite."""
     _, theta, psi = angles
     c, s = np.cos(psi), np.sin(psi)

@@ -135,10 +135,8 @@ def limit_text(row: np.ndarray, h: float, symbol: str) -> str:
         return ""
     i, j = (int(k) for k in used)
     sign = "-" if row[j] < 0.0 else "+"
-    first, second = (
-        f"{row[i]:.3g} {symbol}{_subscript(i)}",
-        f"{abs(row[j]):.3g} {symbol}{_subscript(j)}",
-    )
+    first = f"{row[i]:.3g} {symbol}{_subscript(i)}"
+    second = f"{abs(row[j]):.3g} {symbol}{_subscript(j)}"
     return f"{first} {sign} {second} ≤ {h:.3g}"
 
 

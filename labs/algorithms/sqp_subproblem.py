@@ -118,11 +118,9 @@ def _solve(
     if found.x is None:
         return QpFailure(found.infeasible)
     nu = qp.unit * found.z_bounds
-    p, lam, mu = (
-        _snap_to_bounds(qp, found.x, nu),
-        qp.unit * found.y,
-        qp.unit * np.maximum(found.z, 0.0),
-    )
+    p = _snap_to_bounds(qp, found.x, nu)
+    lam = qp.unit * found.y
+    mu = qp.unit * np.maximum(found.z, 0.0)
     if not all(np.isfinite(part).all() for part in (p, lam, mu, nu)):
         return QpFailure(infeasible=False)
     return SubproblemSolution(p, lam, mu, nu, identify_active_set(scaled, found), loose)

@@ -112,10 +112,8 @@ def parse_own_system(text: str, continuous: bool = False) -> OwnSystem:
             f"B is {_size_text(b)}: it has {n} rows as A has, and a column for each of at most "
             f"{MAX_CONTROLS} controls"
         )
-    q, r = (
-        _weight_matrix("Q", said["Q"], n, "A"),
-        _weight_matrix("R", said["R"], b.shape[1], "B's columns"),
-    )
+    q = _weight_matrix("Q", said["Q"], n, "A")
+    r = _weight_matrix("R", said["R"], b.shape[1], "B's columns")
     x0 = said["x0"].ravel()
     if len(x0) != n:
         raise LabError(f"x0 has {len(x0)} numbers: A wants {n}")

@@ -75,7 +75,7 @@ def reference_lap(settings: TrackingSettings) -> Lap:
 @lru_cache(maxsize=64)
 def full_preview(settings: TrackingSettings) -> PeriodicRegulator:
     """The policy of somebody who has all of the future in view, and its cost. Raises LabError as
-    `laps.lap` and `periodic` do."""
+    `laps.lap` and `solve_periodic` do."""
     along = reference_lap(settings)
     nq, limit = along.x_ref.shape[1] // 2, mechanism(settings.reference_path.robot).control_limit
     position_weight, velocity_weight, effort_weight = settings.weights

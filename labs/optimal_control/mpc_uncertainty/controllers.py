@@ -106,10 +106,8 @@ def _controllers(params: UncertaintyParams) -> Controllers:
         Sigma = np.tile(stationary, (problem.N + 1, 1, 1))
         end = cautious.state_set
     else:
-        cautious, Sigma = (
-            nominal_from_measured_state(problem, noise, p),
-            error_covariances(problem, noise),
-        )
+        cautious = nominal_from_measured_state(problem, noise, p)
+        Sigma = error_covariances(problem, noise)
         end = Polyhedron(X.H, X.h - back_off(X, Sigma[-1], p))
     tight = tighten_problem(problem, S, K)
     ends = (X, end, tight.state_set)

@@ -54,9 +54,8 @@ def changed_motions(name: str, plan: ShootingPlan, k: int, change: float) -> Cha
 def final_states(name: str, plan: ShootingPlan, k: int) -> FinalStates:
     """Over changes of u_k within CHANGE_RANGE."""
     steps = (plan.N - k) * plan.M
-    count = (
-        int(np.clip(MAX_INTEGRATION_STEPS // steps, MIN_CHANGES, MAX_CHANGES)) | 1
-    )  # odd: none is among them
+    # Odd: no change is among them.
+    count = int(np.clip(MAX_INTEGRATION_STEPS // steps, MIN_CHANGES, MAX_CHANGES)) | 1
     changes = np.linspace(-CHANGE_RANGE, CHANGE_RANGE, count)
     truth = np.array([_changed_states(name, plan, k, change)[-1] for change in changes])
     slope = _sensitivity(name, plan, k)[-1]

@@ -52,10 +52,8 @@ def regret_readouts(params: BanditParams, game: Game) -> dict[str, float]:
     """The tiles: where the game stands."""
     shown = {"turn": float(game["regrets"].shape[1])}
     if shown["turn"]:
-        counts, taught = (
-            counted_regret(params, game)[:, -1],
-            game["regrets"][:, : params.training_turns][:, -1],
-        )
+        counts = counted_regret(params, game)[:, -1]
+        taught = game["regrets"][:, : params.training_turns][:, -1]
         for p, name in enumerate(ORDER):
             shown[f"counted_{name}"] = float(counts[p])
             shown[f"lessons_{name}"] = float(taught[p])

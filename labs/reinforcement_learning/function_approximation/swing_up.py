@@ -77,10 +77,8 @@ def initial_training(params: ApproximationParams, rng: np.random.Generator) -> T
 
 def learn(params: ApproximationParams, training: Training) -> Resumable[Training]:
     """The next hundredth of the episodes, or of the draws from a batch; or the next fit."""
-    features, rule = (
-        features_of(params),
-        UpdateRule(params.alpha, params.omega, limit=DIVERGENCE_LIMIT),
-    )
+    features = features_of(params)
+    rule = UpdateRule(params.alpha, params.omega, limit=DIVERGENCE_LIMIT)
     if params.data == "latest":
         part = max(1, round(params.episodes / ITERATIONS))
         after = yield from _train_by_episodes(params, features, rule, training, part)

@@ -154,16 +154,12 @@ def test_a_batch_has_two_answers_and_replay_comes_to_both() -> None:
 
 
 def test_large_batches_lead_to_the_fixed_points_of_the_chain() -> None:
-    task, features, mdp = (
-        walk_task(NINETEEN_STATE_WALK),
-        walk_groups(),
-        walk_mdp(NINETEEN_STATE_WALK),
-    )
-    batch, mu, phi = (
-        batch_of_walks(20_000),
-        on_policy_distribution(NINETEEN_STATE_WALK),
-        features.dense,
-    )
+    task = walk_task(NINETEEN_STATE_WALK)
+    features = walk_groups()
+    mdp = walk_mdp(NINETEEN_STATE_WALK)
+    batch = batch_of_walks(20_000)
+    mu = on_policy_distribution(NINETEEN_STATE_WALK)
+    phi = features.dense
     P, C = mdp.transition_matrix(random_policy(mdp)), mdp.policy_cost(random_policy(mdp))
     fixed = td_fixed_point(*expected_td_update(P, C, 1.0, phi, mu))
     np.testing.assert_allclose(phi @ lstd(features, batch, 1.0), phi @ fixed, atol=0.02)
@@ -226,10 +222,8 @@ def test_what_does_not_fit_is_refused() -> None:
 @pytest.mark.parametrize("gamma", [1.0, 0.9])
 def test_lstd_of_groups_of_states_is_that_of_any_features(gamma: float) -> None:
     """Solved by its band; the same features, written as a matrix, by rank."""
-    batch, apart = (
-        batch_of_walks(5),
-        zero_features_at(tabular_features(21), walk_task(NINETEEN_STATE_WALK).task.terminal),
-    )
+    batch = batch_of_walks(5)
+    apart = zero_features_at(tabular_features(21), walk_task(NINETEEN_STATE_WALK).task.terminal)
     for few in (batch, TransitionBatch(*(column[:7] for column in batch))):  # the second is cut
         for features in (apart, walk_groups()):
             dense = features_from_matrix(features.dense)

@@ -58,11 +58,9 @@ def test_adam_by_hand() -> None:
 
 
 def test_adam_alone_finds_the_least_of_a_parabola() -> None:
-    w, least, adam = (
-        np.zeros(3, np.float32),
-        np.array([1.0, -2.0, 0.5], np.float32),
-        zero_moments(3),
-    )
+    w = np.zeros(3, np.float32)
+    least = np.array([1.0, -2.0, 0.5], np.float32)
+    adam = zero_moments(3)
     for _ in range(2000):
         adam_step(adam, w, w - least, 0.01)
     np.testing.assert_allclose(w, least, atol=1e-4)

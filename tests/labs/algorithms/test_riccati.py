@@ -234,10 +234,8 @@ def problems(draw: st.DrawFn) -> LqrProblem:
     """Stabilizable systems of any shape, with weights whose size differs widely."""
     n, m = draw(st.integers(1, 4)), draw(st.integers(1, 3))
     numbers = st.floats(-1.5, 1.5, allow_subnormal=False).map(lambda x: round(x, 3))
-    a, b = (
-        draw(arrays(float, (n, n), elements=numbers)),
-        draw(arrays(float, (n, m), elements=numbers)),
-    )
+    a = draw(arrays(float, (n, n), elements=numbers))
+    b = draw(arrays(float, (n, m), elements=numbers))
     assume(np.abs(b).max() > 0.05)
     assume(_stabilizability_margin(a, b) > 1e-2)
     size = st.floats(-2.0, 2.0)

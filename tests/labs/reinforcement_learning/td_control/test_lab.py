@@ -208,10 +208,8 @@ def test_the_pupil_surpasses_its_teacher(setting: Mapping[str, Value]) -> None:
     x, total, discount = task.start, 0.0, 1.0
     while discount > 1e-12:
         total += discount * task.mdp.C[x, task.reference_policy[x]]
-        x, discount = (
-            int(task.mdp.successors[x, task.reference_policy[x]]),
-            discount * task.mdp.gamma,
-        )
+        x = int(task.mdp.successors[x, task.reference_policy[x]])
+        discount = discount * task.mdp.gamma
     assert total == pytest.approx(14.6, abs=0.05)
     assert greedy(blind)[0] == pytest.approx(np.full(5, total), abs=1e-9)
     assert np.median(greedy(world_of(setting, q0=0.0))) == pytest.approx(17, abs=0.6)
